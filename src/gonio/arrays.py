@@ -1,0 +1,105 @@
+"""Which array library is in use: the only place that asks (array API standard, through array-api-compat).
+
+    xp, wi, wo = floats(wi, wo)      # one namespace, one floating dtype, one device
+    alpha = like(self.alpha, wi)     # a model's parameter, brought to where the data are
+
+NumPy by default; PyTorch and CuPy arrays are answered in kind, on their device, in their floating dtype.
+"""
+
+from __future__ import annotations
+
+from typing import Any, TypeAlias
+
+import array_api_compat as compat
+import numpy as np
+
+from .errors import ArrayError
+
+Array: TypeAlias = Any  # a NumPy, PyTorch or CuPy array, or what np.asarray takes
+
+
+def namespace(*arrays: Array) -> Any:
+    """The array-API namespace of `arrays`; lists and numbers adapt to the arrays beside them, NumPy where alone.
+
+    Raises `ArrayError` where arrays of two libraries are mixed.
+    """
+    found = [a for a in arrays if _leads(a)] or [np.empty(0)]
+    try:
+        return compat.array_namespace(*found)
+    except TypeError as error:
+        kinds = sorted({type(a).__module__.split(".")[0] for a in found})
+        raise ArrayError(f"arrays of {' and '.join(kinds)} are mixed. Bring them to one library and device.") from error
+
+
+def is_numpy(*arrays: Array) -> bool:
+    """True where every array is NumPy's (or a list or number, which becomes NumPy's): the kernels may be used."""
+    return not any(_leads(a) and not compat.is_numpy_array(a) for a in arrays)
+
+
+def floats(*arrays: Array) -> tuple[Any, ...]:
+    """`(xp, *arrays)`: the common namespace, and each array in it with one floating dtype on one device.
+
+    The widest floating dtype among the arrays is kept (half becomes single, since no sum survives in half); where
+    none is floating, float64. Lists and Python numbers adapt to the arrays beside them.
+
+    Raises `ArrayError` where an array is complex, or holds no numbers.
+    """
+    xp = namespace(*arrays)
+    given = [a for a in arrays if _leads(a)]
+    kinds = [a.dtype for a in given if xp.isdtype(a.dtype, "real floating")]
+    dtype = xp.float32 if kinds and all(k != xp.float64 for k in kinds) else xp.float64
+    device = compat.device(given[0]) if given else None
+    return xp, *(_cast(a, xp, dtype, device) for a in arrays)
+
+
+def like(x: Array, reference: Array) -> Array:
+    """`x` as an array of `reference`'s library, floating dtype and device (gradients of a tensor are kept)."""
+    xp = compat.array_namespace(reference)
+    return _cast(x, xp, reference.dtype, compat.device(reference))
+
+
+def to_numpy(x: Array) -> np.ndarray:
+    """`x` as a NumPy array in main memory."""
+    if compat.is_torch_array(x):
+        return np.asarray(x.detach().cpu())
+    if compat.is_cupy_array(x):
+        return np.asarray(x.get())
+    return np.asarray(x)
+
+
+def require_finite(x: Array, name: str) -> None:
+    """Raises `ArrayError` naming the first entry of `x` that is NaN or infinite."""
+    xp = namespace(x)
+    good = xp.isfinite(x)
+    if not bool(xp.all(good)):
+        at = tuple(int(k) for k in np.argwhere(~to_numpy(good))[0])
+        index = f"[{', '.join(map(str, at))}]" if at else ""
+        raise ArrayError(f"{name}{index} is {float(to_numpy(x)[at])}. Mask or mend such entries before passing them.")
+
+
+def frozen(x: Array, dtype: Any = np.float64) -> Array:
+    """A read-only NumPy copy of `x` to hold in a model (a tensor is held as it is, so that gradients reach it)."""
+    if compat.is_array_api_obj(x) and not compat.is_numpy_array(x):
+        return x
+    copy = np.array(x, dtype=dtype)
+    copy.flags.writeable = False
+    return copy
+
+
+def _leads(x: Array) -> bool:
+    """Whether `x` decides library and dtype: an array does, a number or list (or NumPy's scalars) does not."""
+    return bool(compat.is_array_api_obj(x)) and not isinstance(x, np.generic)
+
+
+def _cast(x: Array, xp: Any, dtype: Any, device: Any) -> Array:
+    if not _leads(x) or (compat.is_numpy_array(x) and not compat.is_numpy_namespace(xp)):
+        values = np.asarray(x)
+        if values.dtype.kind not in "fiub":
+            raise ArrayError(f"expected real numbers, got {x!r:.60}")
+        # A copy, since PyTorch cannot hold read-only memory.
+        return xp.asarray(values.astype(to_numpy(xp.empty(0, dtype=dtype)).dtype), device=device)
+    if not xp.isdtype(x.dtype, ("real floating", "integral", "bool")):
+        raise ArrayError(f"expected real numbers, got dtype {x.dtype}")
+    if x.dtype != dtype:
+        x = xp.astype(x, dtype)
+    return x if device is None or compat.device(x) == device else compat.to_device(x, device)
