@@ -17,12 +17,14 @@ from .errors import ArrayError
 
 # CIE standard illuminant D65, 360 to 780 nm by 10 nm (CIE 15:2004, table T.1), 100 at 560 nm.
 _D65_FIRST, _D65_STEP = 360.0, 10.0
-_D65 = (
-    (46.6383, 52.0891, 49.9755, 54.6482, 82.7549, 91.4860, 93.4318, 86.6823, 104.865, 117.008, 117.812)
-    + (114.861, 115.923, 108.811, 109.354, 107.802, 104.790, 107.689, 104.405, 104.046, 100.000, 96.3342)
-    + (95.7880, 88.6856, 90.0062, 89.5991, 87.6987, 83.2886, 83.6992, 80.0268, 80.2146, 82.2778, 78.2842)
-    + (69.7213, 71.6091, 74.3490, 61.6040, 69.8856, 75.0870, 63.5927, 46.4182, 66.8054, 63.3828)
-)
+# fmt: off
+_D65 = np.array([
+    46.6383, 52.0891, 49.9755, 54.6482, 82.7549, 91.4860, 93.4318, 86.6823, 104.865, 117.008, 117.812,
+    114.861, 115.923, 108.811, 109.354, 107.802, 104.790, 107.689, 104.405, 104.046, 100.000, 96.3342,
+    95.7880, 88.6856, 90.0062, 89.5991, 87.6987, 83.2886, 83.6992, 80.0268, 80.2146, 82.2778, 78.2842,
+    69.7213, 71.6091, 74.3490, 61.6040, 69.8856, 75.0870, 63.5927, 46.4182, 66.8054, 63.3828,
+])
+# fmt: on
 _RGB_FROM_XYZ = np.array(
     [[3.2404542, -1.5371385, -0.4985314], [-0.9692660, 1.8760108, 0.0415560], [0.0556434, -0.2040259, 1.0572252]]
 )
@@ -37,7 +39,8 @@ def colour_matching(wavelengths: Array) -> np.ndarray:
     l = np.asarray(wavelengths, np.float64)
 
     def lobe(peak: float, below: float, above: float) -> np.ndarray:
-        return np.exp(-0.5 * ((l - peak) / np.where(l < peak, below, above)) ** 2)
+        values: np.ndarray = np.exp(-0.5 * ((l - peak) / np.where(l < peak, below, above)) ** 2)
+        return values
 
     x = 1.056 * lobe(599.8, 37.9, 31.0) + 0.362 * lobe(442.0, 16.0, 26.7) - 0.065 * lobe(501.1, 20.4, 26.2)
     y = 0.821 * lobe(568.8, 46.9, 40.5) + 0.286 * lobe(530.9, 16.3, 31.1)
@@ -47,8 +50,7 @@ def colour_matching(wavelengths: Array) -> np.ndarray:
 
 def illuminant_d65(wavelengths: Array) -> np.ndarray:
     """Relative power of D65 at `wavelengths` (nm), linear between the CIE's samples, held beyond 360-780 nm."""
-    table = np.asarray(_D65)
-    return np.interp(wavelengths, _D65_FIRST + _D65_STEP * np.arange(len(table)), table)
+    return np.interp(wavelengths, _D65_FIRST + _D65_STEP * np.arange(len(_D65)), _D65)
 
 
 def spectrum_to_rgb(wavelengths: Array, reflectance: Array) -> Array:
@@ -68,7 +70,7 @@ def spectrum_to_rgb(wavelengths: Array, reflectance: Array) -> Array:
         raise ArrayError(
             f"wavelengths run from {l[0]:g} to {l[-1]:g}, with fewer than two in 400-700. Give them in nanometres."
         )
-    xp, reflectance = floats(reflectance)
+    _, reflectance = floats(reflectance)
     if reflectance.ndim == 0 or reflectance.shape[-1] != len(l):
         raise ArrayError(
             f"reflectance has shape {tuple(reflectance.shape)}; its last axis must hold the {len(l)} wavelengths."
