@@ -39,8 +39,8 @@ def colour_matching(wavelengths: Array) -> np.ndarray:
     l = np.asarray(wavelengths, np.float64)
 
     def lobe(peak: float, below: float, above: float) -> np.ndarray:
-        values: np.ndarray = np.exp(-0.5 * ((l - peak) / np.where(l < peak, below, above)) ** 2)
-        return values
+        value: np.ndarray = np.exp(-0.5 * ((l - peak) / np.where(l < peak, below, above)) ** 2)
+        return value
 
     x = 1.056 * lobe(599.8, 37.9, 31.0) + 0.362 * lobe(442.0, 16.0, 26.7) - 0.065 * lobe(501.1, 20.4, 26.2)
     y = 0.821 * lobe(568.8, 46.9, 40.5) + 0.286 * lobe(530.9, 16.3, 31.1)
@@ -50,7 +50,8 @@ def colour_matching(wavelengths: Array) -> np.ndarray:
 
 def illuminant_d65(wavelengths: Array) -> np.ndarray:
     """Relative power of D65 at `wavelengths` (nm), linear between the CIE's samples, held beyond 360-780 nm."""
-    return np.interp(wavelengths, _D65_FIRST + _D65_STEP * np.arange(len(_D65)), _D65)
+    power: np.ndarray = np.interp(wavelengths, _D65_FIRST + _D65_STEP * np.arange(len(_D65)), _D65)
+    return power
 
 
 def spectrum_to_rgb(wavelengths: Array, reflectance: Array) -> Array:
