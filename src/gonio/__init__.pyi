@@ -1,4 +1,7 @@
 from .brdf.diffuse import Lambert as Lambert
+from .cameras import Orthographic as Orthographic
+from .cameras import Pinhole as Pinhole
+from .cameras import look_at as look_at
 from .errors import GonioError as GonioError
 from .errors import GonioWarning as GonioWarning
 from .sphere.grids import GaussLegendre as GaussLegendre
