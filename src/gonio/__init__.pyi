@@ -1,4 +1,13 @@
 from .brdf.diffuse import Lambert as Lambert
+from .brdf.fresnel import Conductor as Conductor
+from .brdf.fresnel import Fresnel as Fresnel
+from .brdf.fresnel import Schlick as Schlick
+from .brdf.microfacet import Microfacet as Microfacet
+from .brdf.ndf import GGX as GGX
+from .brdf.ndf import Beckmann as Beckmann
+from .brdf.shadowing import Ashikhmin as Ashikhmin
+from .brdf.shadowing import Smith as Smith
+from .brdf.shadowing import VGroove as VGroove
 from .cameras import Orthographic as Orthographic
 from .cameras import Pinhole as Pinhole
 from .cameras import look_at as look_at

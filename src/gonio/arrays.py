@@ -8,6 +8,7 @@ NumPy by default; PyTorch and CuPy arrays are answered in kind, on their device,
 
 from __future__ import annotations
 
+import importlib
 from typing import Any, TypeAlias
 
 import array_api_compat as compat
@@ -65,6 +66,15 @@ def to_numpy(x: Array) -> np.ndarray:
     if compat.is_cupy_array(x):
         return np.asarray(x.get())
     return np.asarray(x)
+
+
+def special(x: Array) -> Any:
+    """The special functions (`erf`, `erfinv`, `gammaln`) of the library that `x` belongs to."""
+    if compat.is_torch_array(x):
+        return importlib.import_module("torch").special
+    if compat.is_cupy_array(x):
+        return importlib.import_module("cupyx.scipy.special")
+    return importlib.import_module("scipy.special")
 
 
 def require_finite(x: Array, name: str) -> None:

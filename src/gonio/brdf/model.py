@@ -21,7 +21,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ..arrays import Array, floats, frozen, namespace, to_numpy
+from ..arrays import Array, floats, frozen, like, namespace, to_numpy
 from ..directions import cos_theta, require_unit
 from ..errors import ParameterError
 
@@ -42,6 +42,8 @@ class Parametric:
 
     def __post_init__(self) -> None:
         for name, bound in self.bounds.items():
+            if getattr(self, name) is None:  # a parameter that may be left out
+                continue
             try:
                 value = frozen(getattr(self, name))
             except (TypeError, ValueError) as error:
@@ -105,6 +107,16 @@ class BRDF(Parametric, ABC):
         xp, wi, wo = floats(wi, wo)
         cosine = cos_theta(wi) + xp.zeros_like(cos_theta(wo))
         return xp.where(cosine > 0, cosine / np.pi, xp.zeros_like(cosine))
+
+    def _strength(self, xp: Any, wo: Array) -> Array:
+        """Roughly what is reflected at `wo`, (...): by it a sum shares its samples among its terms."""
+        return xp.ones_like(wo[..., 2])
+
+    @staticmethod
+    def _mean(xp: Any, colour: Array, wo: Array) -> Array:
+        """The mean over channels of a colour parameter, (...), broadcast to `wo` (..., 3)."""
+        colour = like(colour, wo)
+        return (xp.mean(colour, axis=-1) if colour.ndim else colour) + xp.zeros_like(wo[..., 2])
 
     def __add__(self, other: BRDF) -> BRDF:
         from .combine import Sum
