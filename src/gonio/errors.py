@@ -50,5 +50,13 @@ class EncodingWarning(GonioWarning):
     """The encoding of a file had to be assumed (an 8-bit photograph taken for sRGB)."""
 
 
+class AlphaWarning(GonioWarning):
+    """Transparency was left out: what stands behind or under transparent pixels is unknown."""
+
+
 class AccuracyWarning(GonioWarning):
     """A result is less accurate than its grid, degree or sample count suggests."""
+
+
+class GeometryWarning(GonioWarning):
+    """A mesh has faces without area; they are left out."""

@@ -78,8 +78,9 @@ def test_folders_and_missing_folders_are_refused(tmp_path):
 
 
 @posix
-def test_a_device_is_never_replaced():
-    with pytest.raises(FileError, match="not a regular file"), writing(os.devnull):
+def test_pipes_and_devices_are_never_replaced(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(FileError, match="not a regular file"), writing(tmp_path / "pipe"):
         pass
 
 
