@@ -20,6 +20,9 @@ from .files.images import read_layers as read_layers
 from .files.images import write_image as write_image
 from .files.images import write_layers as write_layers
 from .frames import frame as frame
+from .rendering.tonemap import Filmic as Filmic
+from .rendering.tonemap import Reinhard as Reinhard
+from .rendering.tonemap import tone_map as tone_map
 from .shapes.analytic import Plane as Plane
 from .shapes.analytic import Sphere as Sphere
 from .shapes.heightfield import HeightField as HeightField
@@ -31,3 +34,6 @@ from .sphere.grids import LatLong as LatLong
 from .sphere.harmonics import complex_harmonics as complex_harmonics
 from .sphere.harmonics import harmonics as harmonics
 from .sphere.harmonics import power_spectrum as power_spectrum
+from .sphere.rotation import rotate as rotate
+from .sphere.wigner import wigner_D as wigner_D
+from .sphere.wigner import wigner_d as wigner_d

@@ -94,8 +94,8 @@ def _page(path: Path, tif: Any) -> Any:
         expected = (3,)
     if channels not in expected or str(dtype) not in _DTYPES or page.imagedepth != 1 or page.bitspersample % 8:
         raise FileError(
-            f"{path}: {channels} channels of {page.bitspersample} bits ({dtype}) as {page.photometric.name} are not read, only "
-            "grey and RGB of 8 or 16 bits or floats, with or without alpha."
+            f"{path}: {channels} channels of {page.bitspersample} bits ({dtype}) as {page.photometric.name} are not "
+            "read, only grey and RGB of 8 or 16 bits or floats, with or without alpha."
         )
     return page
 
