@@ -1,0 +1,281 @@
+"""Light from all around: a picture of the surroundings, its layout, and how it stands in the world.
+
+    E(n) = integral of L(w) max(n.w, 0) d omega
+
+Each pixel's value is the radiance at its centre. Between centres `radiance` is bilinear, across the picture's seams
+as well. Sums weigh a pixel with its exact solid angle, except the harmonics of a lat-long map, which use the weights
+that are exact for band-limited maps.
+
+Turning an environment turns its orientation and leaves the pixels alone. Not here: the layouts (`mappings.py`,
+`discs.py`, `cubes.py`), where pictures point by the tools' conventions (`orientation.py`), how a budget of beams is
+spent (`clusters.py`), and environments known by their harmonics alone (`harmonic.py`).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from .._kernels import environment as kernels
+from ..arrays import Array, floats, frozen, is_numpy, like, namespace, to_numpy
+from ..directions import require_unit
+from ..errors import ArrayError, ParameterError
+from .clusters import clusters
+from .importance import Importance
+from .mappings import LatLongMap, Mapping
+from .model import Beams, Light
+from .orientation import Orientation
+
+# Directions in blocks of this many values where harmonics are summed pixel by pixel.
+_BLOCK = 4_000_000
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Environment(Light):
+    """`image` (rows, columns), (rows, columns, 1) or (rows, columns, 3): linear radiance, finite, not negative.
+
+    Single precision is kept, other dtypes become double. What a layout does not show (around a disc) may hold
+    anything and counts as 0. Raises `ArrayError` for other shapes, NaN, infinite or negative radiance, and where the
+    picture's aspect is not the layout's.
+
+    A PyTorch or CuPy image is answered in kind by `radiance`, `harmonics`, `mean_radiance` and the irradiance of
+    unbudgeted `beams`, and gradients reach it; sampling, budgets and resampling are NumPy's.
+    """
+
+    image: Array
+    mapping: Mapping = dataclasses.field(default_factory=LatLongMap)
+    orientation: Orientation = Orientation.GONIO
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.mapping, Mapping) or not isinstance(self.orientation, Orientation):
+            raise ParameterError(
+                "Environment: pass a mapping such as LatLongMap() and an orientation such as Orientation.PANORAMA."
+            )
+        xp, image = floats(self.image)
+        if image.ndim == 2:
+            image = image[..., None]
+        if image.ndim != 3 or image.shape[-1] not in (1, 3):
+            raise ArrayError(
+                f"Environment: image has shape {tuple(np.shape(self.image))}; it is (rows, columns), or (rows, "
+                "columns, C) with C = 1 or 3. Drop an alpha channel with image[..., :3]."
+            )
+        self.orientation.matrix(self.mapping)
+        shown = self.mapping.solid_angles(*image.shape[:2]) > 0
+        if not shown.all():
+            image = xp.where(like(shown, image)[..., None] > 0, image, xp.zeros_like(image))
+        good = xp.isfinite(image) & (image >= 0)
+        if not bool(xp.all(good)):
+            at = tuple(int(k) for k in np.argwhere(~to_numpy(good))[0])
+            raise ArrayError(
+                f"Environment: image[{', '.join(map(str, at))}] is {float(to_numpy(image)[at]):.6g}; radiance is finite "
+                "and not negative. Mend the picture, or cut it off with np.clip(image, 0, None) if that is what you mean."
+            )
+        object.__setattr__(self, "image", frozen(image, image.dtype))
+
+    @property
+    def distant(self) -> bool:
+        return True
+
+    @property
+    def rows(self) -> int:
+        return int(self.image.shape[0])
+
+    @property
+    def columns(self) -> int:
+        return int(self.image.shape[1])
+
+    @cached_property
+    def turn(self) -> np.ndarray:
+        """(3, 3): directions in the layout's own axes to the world's, w = turn @ own; determinant +1 or -1."""
+        return self.orientation.matrix(self.mapping)
+
+    @cached_property
+    def solid_angles(self) -> np.ndarray:
+        """Solid angle of each pixel in sr, (rows, columns)."""
+        solid: np.ndarray = frozen(self.mapping.solid_angles(self.rows, self.columns))
+        return solid
+
+    def directions(self) -> tuple[np.ndarray, np.ndarray]:
+        """World directions (rows, columns, 3) of the pixel centres, and which pixels show any (rows, columns)."""
+        own, shown = self.mapping.directions(self.rows, self.columns)
+        world: np.ndarray = own @ self.turn.T
+        return world, shown
+
+    @property
+    def mean_radiance(self) -> Array:
+        """Radiance averaged over all directions that the picture shows, (C,)."""
+        weights = like(self.solid_angles / self.solid_angles.sum(), self.image)
+        return namespace(self.image).sum(self.image * weights[..., None], axis=(0, 1))
+
+    def radiance(self, w: Array) -> Array:
+        """Radiance (..., C) arriving from the unit world directions `w` (..., 3), bilinear between pixel centres.
+
+        Raises `DirectionError` where w is not unit.
+        """
+        require_unit(w, "w")
+        if is_numpy(w, self.image):
+            _, w = floats(w)
+            flat = np.ascontiguousarray(w.reshape(-1, 3))
+            out = np.empty((len(flat), self.image.shape[-1]), dtype=self.image.dtype)
+            kernels.look_up(self.mapping.kernel, self.mapping.parameter, self._atlas, self.turn, flat, out)
+            return out.reshape(*w.shape[:-1], -1)
+        return self._radiance(w)
+
+    def _radiance(self, w: Array) -> Array:
+        """`radiance` as array code."""
+        xp = namespace(self.image)
+        w = like(w, self.image)
+        height, width = self.mapping.sheet_shape(self.rows, self.columns)
+        sheet, u, v = self.mapping.locate(xp, w @ like(self.turn, w))
+        x, y = u * width + 0.5, v * height + 0.5
+        j = xp.clip(xp.astype(x, xp.int64), 0, width)
+        i = xp.clip(xp.astype(y, xp.int64), 0, height)
+        g, f = (x - xp.astype(j, x.dtype))[..., None], (y - xp.astype(i, y.dtype))[..., None]
+        flat = xp.reshape(self._atlas, (-1, self.image.shape[-1]))
+        at = (sheet * (height + 2) + i) * (width + 2) + j
+
+        def texel(k: Array) -> Array:
+            return xp.reshape(xp.take(flat, xp.reshape(k, (-1,)), axis=0), (*k.shape, -1))
+
+        top = texel(at) * (1 - g) + texel(at + 1) * g
+        bottom = texel(at + width + 2) * (1 - g) + texel(at + width + 3) * g
+        return top * (1 - f) + bottom * f
+
+    @cached_property
+    def _atlas(self) -> Array:
+        """Sheets with ghost texels around them, (sheets, h + 2, w + 2, C)."""
+        xp = namespace(self.image)
+        height, width = self.mapping.sheet_shape(self.rows, self.columns)
+
+        def index(k: np.ndarray) -> Array:
+            # Through a float copy, since `like` brings floats to the image's device: exact below 2^53.
+            return xp.astype(
+                xp.reshape(like(k.astype(np.float64), xp.astype(self.image[:0], xp.float64)), (-1,)), xp.int64
+            )
+
+        pixels = xp.reshape(self.image, (self.rows * self.columns, -1))
+        flat = xp.take(pixels, index(self.mapping.placement(self.rows, self.columns)), axis=0)
+        corners = self.mapping.corners(height, width)
+        if len(corners):
+            meeting = xp.reshape(xp.take(flat, index(corners), axis=0), (len(corners), 3, -1))
+            flat = xp.concat((flat, xp.mean(meeting, axis=1)), axis=0)
+        atlas = xp.take(flat, index(self.mapping.ghosts(height, width)), axis=0)
+        return xp.reshape(atlas, (self.mapping.sheets, height + 2, width + 2, -1))
+
+    def beams(self, positions: Array | None = None, budget: int | None = None) -> Beams:
+        """A beam for each pixel that shows anything, or at most `budget` of them (see `clusters.py`).
+
+        directions (K, 3), irradiance (K, C) = radiance x solid angle, distance infinite. Whatever the budget, the
+        irradiances sum to the same. Raises `ParameterError` for a budget below 1.
+        """
+        if budget is not None and budget < 1:
+            raise ParameterError(f"budget = {budget} is no number of beams; it is at least 1.")
+        w, shown = self.directions()
+        if budget is None or budget >= int(shown.sum()):
+            at = np.flatnonzero(shown)
+            xp = namespace(self.image)
+            pixels = xp.reshape(self.image, (self.rows * self.columns, -1))
+            irradiance = (pixels * like(self.solid_angles.reshape(-1, 1), self.image))[at.tolist()]
+            directions = like(w.reshape(-1, 3)[at], self.image)
+            return Beams(directions, irradiance, xp.full_like(directions[:, 0], math.inf))
+        energy = to_numpy(self.image) * self.solid_angles[..., None]
+        directions, irradiance = clusters(w, energy, budget)
+        directions, irradiance = like(directions, self.image), like(irradiance, self.image)
+        return Beams(directions, irradiance, namespace(self.image).full_like(directions[:, 0], math.inf))
+
+    @cached_property
+    def _importance(self) -> Importance:
+        own = Environment(to_numpy(self.image), self.mapping, self.orientation)
+        if not isinstance(self.mapping, LatLongMap):
+            height, _ = self.mapping.sheet_shape(self.rows, self.columns)
+            own = own.resampled(LatLongMap(), max(2 * height if self.mapping.sheets == 6 else height, 2))
+        return Importance.of(own.image, own.turn)
+
+    def sample(self, u: Array) -> np.ndarray:
+        """Unit world directions (..., 3) drawn by luminance x solid angle, from uniform `u` (..., 2) in [0, 1).
+
+        Strata of u stay strata of the sphere's rows and columns. The density is `pdf`.
+        """
+        return self._importance.sample(to_numpy(u))
+
+    def pdf(self, w: Array) -> np.ndarray:
+        """Density of `sample` in 1/sr at unit world directions (..., 3) -> (...), positive everywhere."""
+        require_unit(w, "w")
+        return self._importance.pdf(to_numpy(w))
+
+    def rotated(self, rotation: Array) -> Environment:
+        """The environment turned by `rotation` (3, 3): what arrived from w arrives from R w. No pixel is resampled.
+
+        Raises `DirectionError` where it is not a rotation.
+        """
+        return dataclasses.replace(self, orientation=self.orientation.rotated(rotation))
+
+    def harmonics(self, degree: int) -> Array:
+        """Real harmonic coefficients of the radiance in the world frame, ((degree + 1)^2, C); RH 4.13.
+
+        Lat-long maps by `sphere.analysis` on their grid of centres, exact for maps band-limited below it; other
+        layouts by the sum over pixels of radiance x Y_lm(centre) x solid angle.
+        """
+        if degree < 0:
+            raise ParameterError(f"degree = {degree} is negative.")
+        if isinstance(self.mapping, LatLongMap) and degree <= self.rows - 1:
+            return self._harmonics_of_grid(degree)
+        return self._harmonics_of_pixels(degree)
+
+    def _harmonics_of_grid(self, degree: int) -> Array:
+        from ..sphere.grids import LatLong
+        from ..sphere.rotation import rotate
+        from ..sphere.transform import analysis
+
+        own = analysis(self.image, LatLong(self.rows, self.columns), degree)
+        if np.allclose(self.turn, np.eye(3), atol=1e-12):
+            return own
+        turn = self.turn
+        if np.linalg.det(turn) < 0:
+            # A mirror is a turn after the reflection of every direction through the origin: (-1)^l.
+            sign = np.repeat((-1.0) ** np.arange(degree + 1), 2 * np.arange(degree + 1) + 1)
+            own, turn = own * like(sign[:, None], own), -turn
+        return rotate(own, turn)
+
+    def _harmonics_of_pixels(self, degree: int) -> Array:
+        from ..sphere.harmonics import harmonics
+
+        xp = namespace(self.image)
+        w, shown = self.directions()
+        step = max(_BLOCK // ((degree + 1) ** 2 * self.columns), 1)
+        total: Any = 0.0
+        for r in range(0, self.rows, step):
+            rows = slice(r, r + step)
+            basis = harmonics(degree, w[rows]) * (self.solid_angles[rows] * shown[rows])[..., None]
+            basis = like(basis.reshape(-1, (degree + 1) ** 2), self.image)
+            total = total + basis.T @ xp.reshape(self.image[rows], (-1, self.image.shape[-1]))
+        return total
+
+    def resampled(self, mapping: Mapping, rows: int, orientation: Orientation | None = None) -> Environment:
+        """The same light in another layout of `rows` rows (and standing as `orientation` says; as now, if None).
+
+        Each new pixel is the mean of the bilinear radiance over its solid angle, from at least two samples for each
+        old pixel's width, so that no lamp falls through; energy is kept to about 1e-3 (bilinear look-ups spread the
+        pixels of a lat-long map's polar rows unevenly).
+        """
+        orientation = self.orientation if orientation is None else orientation
+        shape = mapping.shape(rows)
+        height, width = mapping.sheet_shape(*shape)
+        turn = self.turn.T @ orientation.matrix(mapping)
+        solid = mapping.sheet_solid_angles(height, width)
+        finest = math.sqrt(float(np.max(self.solid_angles)))
+        samples = max(math.ceil(2 * math.sqrt(float(solid.max())) / finest - 1e-9), 2)
+        atlas = np.asarray(to_numpy(self._atlas))
+        channels = atlas.shape[-1]
+        sheets = np.empty((mapping.sheets, height, width, channels), dtype=atlas.dtype)
+        kernels.resample(
+            self.mapping.kernel, self.mapping.parameter, atlas, mapping.kernel, mapping.parameter, turn, samples,
+            np.empty(channels), sheets,
+        )  # fmt: skip
+        image = np.zeros((shape[0] * shape[1], channels), dtype=atlas.dtype)
+        image[mapping.placement(*shape)] = np.where((solid > 0)[None, ..., None], sheets, 0)
+        return Environment(like(image.reshape(*shape, channels), self.image), mapping, orientation)
