@@ -1,0 +1,83 @@
+"""`gonio convert`: images from format to format, and environment maps from layout to layout."""
+
+from __future__ import annotations
+
+import enum
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+from .render import Curve, write
+
+if TYPE_CHECKING:
+    from ..lights.mappings import Mapping
+    from ..lights.orientation import Orientation
+
+
+class Layout(enum.StrEnum):
+    """Layouts of environment maps by name."""
+
+    latlong = "latlong"
+    angular = "angular"
+    ball = "ball"
+    paraboloid = "paraboloid"
+    cross = "cross"
+    cross_wide = "cross-wide"
+    strip = "strip"
+    strip_wide = "strip-wide"
+
+    def mapping(self) -> Mapping:
+        """The layout itself."""
+        import gonio as gn
+
+        return {
+            Layout.latlong: gn.LatLongMap(),
+            Layout.angular: gn.AngularMap(),
+            Layout.ball: gn.MirrorBall(),
+            Layout.paraboloid: gn.DualParaboloid(),
+            Layout.cross: gn.CubeCross(vertical=True),
+            Layout.cross_wide: gn.CubeCross(vertical=False),
+            Layout.strip: gn.CubeStrip(vertical=True),
+            Layout.strip_wide: gn.CubeStrip(vertical=False),
+        }[self]
+
+
+def convert(
+    source: list[Path] = typer.Argument(..., help="An image or environment map (two or six files for its parts)."),
+    output: Path = typer.Option(..., "--output", "-o", help="Where to; the suffix names the format."),
+    to: Layout | None = typer.Option(None, "--to", help="Layout of the map that is written."),
+    layout: Layout | None = typer.Option(None, "--from", help="Layout of the map read, where its shape does not tell."),
+    orientation: str = typer.Option("", "--orientation", help="The tool whose convention the map read follows."),
+    to_orientation: str = typer.Option("", "--to-orientation", help="The tool that will read the map written."),
+    rows: int | None = typer.Option(None, "--rows", min=1, help="Rows of the map written; else as fine as the source."),
+    exposure: float = typer.Option(0.0, "--exposure", help="Stops, where the output is PNG."),
+    curve: Curve = typer.Option(Curve.filmic, "--curve", help="Tone curve, where the output is PNG."),
+) -> None:
+    """Convert an image's format, or (with --to) an environment map's layout and orientation."""
+    import gonio as gn
+    from gonio.files.environments import picture
+
+    if to is None and layout is None and not orientation and not to_orientation and rows is None and len(source) == 1:
+        write(output, gn.read_image(source[0]), exposure, curve)
+        typer.echo(str(output))
+        return
+    environment = gn.read_environment(
+        source[0] if len(source) == 1 else source, layout and layout.mapping(), named(orientation)
+    )
+    image = picture(environment, to and to.mapping(), named(to_orientation), rows)
+    write(output, image, exposure, curve)
+    typer.echo(f"{output}  (read as {type(environment.mapping).__name__}, {environment.orientation.name})")
+
+
+def named(orientation: str) -> Orientation | None:
+    """The published orientation of that name; None for none."""
+    if not orientation:
+        return None
+    from gonio.lights.orientation import PUBLISHED
+
+    key = orientation.upper().replace("-", "_").replace(".", "_")
+    if key not in PUBLISHED:
+        known = ", ".join(name.lower().replace("_", "-") for name in PUBLISHED)
+        raise typer.BadParameter(f"'{orientation}' is no published orientation; those are {known}.")
+    return PUBLISHED[key]

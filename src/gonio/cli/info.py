@@ -1,0 +1,127 @@
+"""`gonio info`: what a file holds, said by gonio's own readers."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import typer
+
+IMAGES = (".exr", ".hdr", ".pic", ".pfm", ".png", ".tif", ".tiff", ".jpg", ".jpeg", ".tga")
+RAW = (".dng", ".cr2", ".cr3", ".nef", ".arw", ".raf", ".orf", ".rw2")
+BRDFS = (".binary", ".bsdf", ".brdf")
+MESHES = (".obj", ".ply", ".stl", ".glb", ".gltf", ".off")
+
+
+def info(
+    files: list[Path] = typer.Argument(..., help="Images, environment maps, BRDF files, meshes."),
+    as_json: bool = typer.Option(False, "--json", help="One JSON object a file, a line each."),
+) -> None:
+    """Say what files hold: sizes, formats, ranges, albedos, what looks wrong."""
+    for path in files:
+        facts = describe(path)
+        if as_json:
+            typer.echo(json.dumps({"file": str(path), **facts}, default=str))
+            continue
+        typer.echo(str(path))
+        width = max(map(len, facts))
+        for name, value in facts.items():
+            typer.echo(f"  {name:<{width}}  {_worded(value)}")
+
+
+def describe(path: Path) -> dict[str, Any]:
+    """The facts of one file, by name. Raises `FileError` where nothing can be said."""
+    from gonio.errors import FileError
+
+    suffix = path.suffix.lower()
+    if suffix in IMAGES + RAW:
+        return _image(path)
+    if suffix in BRDFS:
+        return _brdf(path)
+    if suffix in MESHES:
+        return _mesh(path)
+    known = " ".join(IMAGES + BRDFS + MESHES)
+    raise FileError(f"{path}: not a kind of file that gonio knows ({known}, and camera raw).")
+
+
+def _image(path: Path) -> dict[str, Any]:
+    import numpy as np
+
+    import gonio as gn
+    from gonio.colour import luminance
+
+    header = gn.image_info(path)
+    image = gn.read_image(path)
+    bright = np.asarray(luminance(image))
+    facts: dict[str, Any] = {
+        "kind": "image",
+        "format": header.format,
+        "pixels": f"{header.columns} x {header.rows}",
+        "channels": ", ".join(header.channels),
+        "samples": header.dtype,
+        "encoding": header.encoding or "not stated",
+        "mean": image.mean(axis=(0, 1)).tolist(),
+        "luminance": {"least": float(bright.min()), "median": float(np.median(bright)), "greatest": float(bright.max())},
+    }
+    layout = _layout(path)
+    if layout:
+        facts["environment map"] = layout
+    attributes = {k: v for k, v in header.attributes.items() if isinstance(v, str | int | float)}
+    if attributes:
+        facts["attributes"] = attributes
+    return facts
+
+
+def _layout(path: Path) -> str:
+    """What the picture would be taken for as an environment map; empty where its shape fits none."""
+    from gonio.errors import FileError
+    from gonio.files.environments import layout_of
+
+    try:
+        mapping, orientation = layout_of(path)
+    except FileError:
+        return ""
+    return f"{type(mapping).__name__}, orientation {orientation.name}"
+
+
+def _brdf(path: Path) -> dict[str, Any]:
+    import numpy as np
+
+    import gonio as gn
+    from gonio.directions import from_spherical
+
+    brdf = gn.read_brdf(path)
+    angles = (0.0, 30.0, 60.0, 80.0)
+    wo = from_spherical(np.radians(angles), np.zeros(len(angles)))
+    albedo = np.asarray(gn.albedo(brdf, wo))
+    return {
+        "kind": "BRDF",
+        "model": type(brdf).__name__,
+        **{f"albedo at {angle:g} degrees": row.tolist() for angle, row in zip(angles, albedo, strict=True)},
+    }
+
+
+def _mesh(path: Path) -> dict[str, Any]:
+    import gonio as gn
+
+    mesh = gn.read_mesh(path)
+    low, high = mesh.bounds
+    return {
+        "kind": "mesh",
+        "vertices": len(mesh.vertices),
+        "faces": len(mesh.faces),
+        "texture coordinates": mesh.uv is not None,
+        "low": low.tolist(),
+        "high": high.tolist(),
+    }
+
+
+def _worded(value: Any) -> str:
+    if isinstance(value, dict):
+        return ", ".join(f"{k} {_worded(v)}" for k, v in value.items())
+    if isinstance(value, list):
+        return " ".join(_worded(v) for v in value)
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
