@@ -1,0 +1,174 @@
+"""The theta factor of every harmonic, scalar and spin-weighted, as three-term recursions ready for the kernels.
+
+    lambda_lm(theta) = sqrt((2 l + 1) / (4 pi)) d^l_{m,-s}(theta)                                 s the spin weight
+    g_l lambda_{l+1} = (cos theta - b_l) lambda_l - g_{l-1} lambda_{l-1},      b_l = -m s / (l (l + 1))
+    g_l = sqrt((l + 1)^2 - m^2) sqrt((l + 1)^2 - s^2) / ((l + 1) sqrt((2 l + 1) (2 l + 3)))
+
+starting at l = max(m, abs(s)) with a product of powers of cos and sin of theta/2. Only m >= 0 is needed: those at -m are
+those at m seen from the other pole, d^l_{-m,-s}(theta) = (-1)^(l+s) d^l_{m,-s}(pi - theta).
+
+Without spin two steps make one in cos^2 theta, on the northern rings alone: the even l - m are symmetric about the
+equator, and the odd ones are cos theta times a sum over the even ones (Ishioka 2018, "A new recurrence formula for
+efficient computation of spherical harmonic transform"; the way of libsharp and ducc).
+The transforms over phi and the public functions stand in `transform.py`.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from functools import lru_cache
+
+import numpy as np
+
+from .._kernels import legendre as kernels
+from .grids import Grid
+
+_LEVEL = 800  # a number is start 2^(_LEVEL level), as in the kernels
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Recursion:
+    """What the kernels take: for every order m = 0..degree its start at every ring and its factors at every step."""
+
+    start: np.ndarray  # (orders, rings)
+    level: np.ndarray  # (orders, rings), 0 or less
+    a: np.ndarray  # (orders, steps), steps padded to eights with zeros
+    b: np.ndarray
+    c: np.ndarray
+    count: np.ndarray  # (orders,): steps that are not padding
+    first: np.ndarray  # (orders,): the rings first..stop are not negligible
+    stop: np.ndarray
+    t: np.ndarray  # (rings,): the argument, cos theta or its square
+
+    def synthesise(self, coefficients: np.ndarray) -> np.ndarray:
+        """(orders, steps, channels) -> (orders, channels, rings)."""
+        rings = np.empty((coefficients.shape[0], coefficients.shape[2], self.t.size), coefficients.dtype)
+        kernels.synthesise(coefficients, *self._arguments(), rings)
+        return rings
+
+    def analyse(self, rings: np.ndarray) -> np.ndarray:
+        """(orders, channels, rings) -> (orders, steps, channels)."""
+        coefficients = np.empty((rings.shape[0], self.a.shape[1], rings.shape[1]), rings.dtype)
+        kernels.analyse(rings, *self._arguments(), coefficients)
+        return coefficients
+
+    def table(self, m: int) -> np.ndarray:
+        """The functions of order `m`, (steps, rings), in float64; the padding is 0."""
+        table = np.empty((self.a.shape[1], self.t.size))
+        kernels.tabulate(self.start[m], self.level[m], self.a[m], self.b[m], self.c[m], self.t, table)
+        table[self.count[m] :] = 0
+        return table
+
+    def _arguments(self) -> tuple[np.ndarray, ...]:
+        return self.start, self.level, self.a, self.b, self.c, self.count, self.first, self.stop, self.t
+
+
+@lru_cache(maxsize=8)
+def spin_recursion(grid: Grid, degree: int, spin: int) -> Recursion:
+    """lambda_lm at all rows of `grid`, one step for each l from max(m, abs(spin)) to `degree`."""
+    m, l = _steps(degree, spin)
+    g, before = _coupling(l, m, spin), _coupling(l - 1, m, spin)
+    centre = -m * spin / np.maximum(l * (l + 1), 1)
+    return _recursion(grid.theta, degree, spin, l, (1 / g, -centre / g, before / g), np.cos(grid.theta))
+
+
+@lru_cache(maxsize=8)
+def folded_recursion(grid: Grid, degree: int) -> Recursion:
+    """(-1)^m lambda_lm (no Condon-Shortley sign) for l = m, m + 2, ..., at the northern rows, the equator among them."""
+    m, l = _steps(degree, 0)
+    l = m + 2 * (l - m)[:, : degree // 2 + 1]
+    gg = _coupling(l, m, 0) * _coupling(l + 1, m, 0)
+    back = _coupling(l - 1, m, 0)
+    factors = (1 / gg, -(_coupling(l, m, 0) ** 2 + back**2) / gg, _coupling(l - 2, m, 0) * back / gg)
+    theta = grid.theta[: (grid.rows + 1) // 2]
+    return _recursion(theta, degree, 0, l, factors, np.cos(theta) ** 2, sign=False)
+
+
+@lru_cache(maxsize=8)
+def odd_factors(degree: int, steps: int) -> tuple[np.ndarray, np.ndarray]:
+    """(1 / g_l, g_{l+1}) for l = m, m + 2, ..., each (steps, orders, 1): what turns sums over odd l into even ones.
+
+    cos theta lambda_l = g_l lambda_{l+1} + g_{l-1} lambda_{l-1}, so that the sum over odd l - m of f_l lambda_l is cos
+    theta times the sum over even l - m of h_l lambda_l, where g_l h_l = f_{l+1} - g_{l+1} h_{l+2}.
+    """
+    m = np.arange(degree + 1)[None, :, None]
+    l = m + 2 * np.arange(steps)[:, None, None]
+    return 1 / _coupling(l, m, 0), _coupling(l + 1, m, 0)
+
+
+def _steps(degree: int, spin: int) -> tuple[np.ndarray, np.ndarray]:
+    """m (orders, 1) and l (orders, steps), counted from max(m, abs(spin))."""
+    m = np.arange(degree + 1)[:, None]
+    return m, np.maximum(m, abs(spin)) + np.arange(degree - abs(spin) + 1)[None, :]
+
+
+def _coupling(l: np.ndarray, m: np.ndarray, spin: int) -> np.ndarray:
+    """g_l; 0 below the first l."""
+    n = np.maximum(l + 1.0, 1.0)
+    square = np.maximum(n * n - m * m, 0) * np.maximum(n * n - spin * spin, 0) / (n * n * (4 * n * n - 1))
+    return np.sqrt(np.where(l >= np.maximum(m, abs(spin)), square, 0))
+
+
+def _recursion(
+    theta: np.ndarray,
+    degree: int,
+    spin: int,
+    l: np.ndarray,
+    factors: tuple[np.ndarray, ...],
+    t: np.ndarray,
+    sign: bool = True,
+) -> Recursion:
+    inside = l <= degree
+    steps = -(-l.shape[1] // kernels.EIGHT) * kernels.EIGHT
+    padded = []
+    for factor in factors:
+        values = np.zeros((degree + 1, steps))
+        values[:, : l.shape[1]] = np.where(inside, factor, 0)
+        padded.append(values)
+    start, level = _start(theta, degree, spin, sign)
+    first, stop = _range(theta, degree, spin)
+    return Recursion(start, level, *padded, inside.sum(axis=1), first, stop, t)
+
+
+def _start(theta: np.ndarray, degree: int, spin: int, sign: bool) -> tuple[np.ndarray, np.ndarray]:
+    """lambda at l = max(m, abs(s)) for m = 0..degree: sqrt((2l + 1)/(4 pi) binomial(2l, p)) cos^p sin^q of theta/2.
+
+    p = abs(m - s), q = abs(m + s). As start 2^(800 level) with start in (2^-801, 1].
+    """
+    highest = degree + abs(spin)
+    cosine, sine = _powers(np.cos(theta / 2), highest), _powers(np.sin(theta / 2), highest)
+    start, level = np.empty((degree + 1, theta.size)), np.empty((degree + 1, theta.size), np.int64)
+    for m in range(degree + 1):
+        l, p, q = max(m, abs(spin)), abs(m - spin), abs(m + spin)
+        square = (2 * l + 1) * math.comb(2 * l, p)
+        shift = max(square.bit_length() - 100, 0) // 2  # a binomial may exceed every float
+        norm = math.sqrt((square >> (2 * shift)) / (4 * math.pi))
+        negative = sign and q % 2 == 1 and -spin <= m
+        mantissa, exponent = np.frexp(cosine[0][p] * sine[0][q] * (-norm if negative else norm))
+        exponent = exponent + cosine[1][p] + sine[1][q] + shift
+        level[m] = np.minimum(-(-exponent // _LEVEL), 0)
+        start[m] = np.ldexp(mantissa, exponent - _LEVEL * level[m])
+    return start, level
+
+
+def _powers(x: np.ndarray, highest: int) -> tuple[np.ndarray, np.ndarray]:
+    """x^0..x^highest as (mantissa, exponent), each (highest + 1, x.size), beyond the range of a float64."""
+    mantissa, exponent = np.ones((highest + 1, x.size)), np.zeros((highest + 1, x.size), np.int64)
+    for k in range(highest):
+        mantissa[k + 1], carried = np.frexp(mantissa[k] * x)
+        exponent[k + 1] = exponent[k] + carried
+    return mantissa, exponent
+
+
+def _range(theta: np.ndarray, degree: int, spin: int) -> tuple[np.ndarray, np.ndarray]:
+    """For each order the rings first..stop where lambda is not negligible.
+
+    lambda_lm lives where l^2 sin^2 theta > m^2 + s^2 - 2 m abs(s cos theta) and dies like a power m - l sin theta
+    towards the poles; the margin of 100 is libsharp's and leaves less than 1e-20.
+    """
+    m = np.arange(degree + 1)[:, None]
+    reach = degree * np.sin(theta) + max(100.0, 0.01 * degree)
+    lives = m * m + spin * spin - 2 * m * abs(spin) * np.abs(np.cos(theta)) <= reach * reach
+    lives[:, -1] |= ~lives.any(axis=1)  # never an empty range
+    return np.argmax(lives, axis=1), theta.size - np.argmax(lives[:, ::-1], axis=1)
