@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from .arrays import Array, floats, like, to_numpy
+from .arrays import Array, floats, is_numpy, like, to_numpy
 from .errors import ArrayError, DirectionError
 
 # Unit vectors stored in float32, or written with four digits, are taken for unit vectors; slips of scale are not.
@@ -52,6 +52,13 @@ def require_unit(w: Array, name: str) -> None:
     """Raises `DirectionError` naming the first of `w` (..., 3) whose length is not 1 within `UNIT_TOLERANCE`."""
     xp, w = floats(w)
     _require_components(w, name)
+    if is_numpy(w) and w.size > 3000 and w.flags.c_contiguous:  # below, NumPy answers sooner than a loop is loaded
+        from ._kernels.unit import are_unit
+
+        flat = w.reshape(-1, 3)
+        flat.flags.writeable = False  # of the view only: one loop for all input
+        if are_unit(flat, 2 * UNIT_TOLERANCE):
+            return
     off = xp.abs(dot(w, w) - 1)
     if not bool(xp.all(off <= 2 * UNIT_TOLERANCE)):  # so written that NaN fails too
         at = _first(~(to_numpy(off) <= 2 * UNIT_TOLERANCE))

@@ -11,13 +11,29 @@ from __future__ import annotations
 import dataclasses
 from typing import Any
 
-from ..arrays import Array, floats
+from .._kernels import microfacet as kernels
+from ..arrays import Array, floats, to_numpy
 from ..directions import dot, half_vector
-from .fresnel import Fresnel, Reflectance
+from .fresnel import Conductor, Fresnel, Reflectance, Schlick
 from .model import BRDF
-from .ndf import GGX, NDF
-from .sampling import mirrored
-from .shadowing import Shadowing, Smith
+from .ndf import GGX, NDF, Beckmann, Slopes
+from .pairs import through
+from .sampling import facet_between, mirrored
+from .shadowing import Ashikhmin, Shadowing, Smith, VGroove
+
+# What the compiled loop knows; everything else goes through array code.
+NDFS: dict[type, int] = {Beckmann: kernels.BECKMANN, GGX: kernels.GGX}
+REFLECTANCES: dict[type, int] = {
+    Fresnel: kernels.DIELECTRIC,
+    Conductor: kernels.CONDUCTOR,
+    Schlick: kernels.SCHLICK,
+}
+SHADOWINGS: dict[Shadowing, int] = {
+    Smith(): kernels.CORRELATED,
+    Smith(correlated=False): kernels.SEPARABLE,
+    Ashikhmin(): kernels.SEPARABLE,
+    VGroove(): kernels.GROOVE,
+}
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -44,10 +60,17 @@ class Microfacet(BRDF):
         _, wo, u = floats(wo, u)
         return mirrored(wo, self.ndf.sample(wo, u[..., 1:]))
 
+    def _compiled(self, wi: Array, wo: Array) -> Array | None:
+        # By exact type: a subclass may have another formula.
+        ndf, fresnel = NDFS.get(type(self.ndf)), REFLECTANCES.get(type(self.fresnel))
+        shadowing = SHADOWINGS.get(self.shadowing)
+        if not isinstance(self.ndf, Slopes) or ndf is None or fresnel is None or shadowing is None:
+            return None
+        widths = (to_numpy(alpha)[..., None] for alpha in self.ndf.widths())
+        numbers = [getattr(self.fresnel, name) for name in self.fresnel.bounds]
+        return through(kernels.microfacet, wi, wo, (*widths, numbers[0], numbers[-1]), ndf, shadowing, fresnel)
+
     def pdf(self, wi: Array, wo: Array) -> Array:
         xp, wi, wo = floats(wi, wo)
-        h = half_vector(wi, wo)
-        # A half vector below the horizon is never drawn.
-        facing = (h[..., 2] > 0) & (dot(wo, h) > 0)
-        safe = xp.where(facing, dot(wo, h), xp.ones_like(h[..., 2]))
-        return xp.where(facing, self.ndf.pdf(h, wo) / (4 * safe), xp.zeros_like(safe))
+        h = facet_between(wi, wo)
+        return self.ndf.pdf(h, wo) / (4 * xp.clip(xp.abs(dot(wo, h)), xp.finfo(wo.dtype).eps, None))

@@ -21,7 +21,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ..arrays import Array, floats, frozen, like, namespace, to_numpy
+from ..arrays import Array, floats, frozen, is_numpy, like, namespace, to_numpy
 from ..directions import cos_theta, require_unit
 from ..errors import ParameterError
 
@@ -84,12 +84,18 @@ class BRDF(Parametric, ABC):
 
     def evaluate(self, xp: Any, wi: Array, wo: Array) -> Array:
         """`f` without its checks, for callers that made the directions themselves; `xp, wi, wo` come from `floats`."""
+        if is_numpy(wi, wo) and (values := self._compiled(wi, wo)) is not None:
+            return values
         above = (cos_theta(wi) > 0) & (cos_theta(wo) > 0)
         return xp.where(above[..., None], self._f(xp, wi, wo), xp.zeros_like(wi[..., :1]))
 
     @abstractmethod
     def _f(self, xp: Any, wi: Array, wo: Array) -> Array:
         """The model's formula; finite for every pair of directions, whatever it returns below the surface."""
+
+    def _compiled(self, wi: Array, wo: Array) -> Array | None:
+        """What `evaluate` answers for NumPy arrays, by a compiled loop; None where the model has none."""
+        return None
 
     def sample(self, wo: Array, u: Array) -> Array:
         """Directions `wi` (..., 3) drawn for `wo` (..., 3) by uniform numbers `u` (..., 3) in [0, 1).
@@ -111,6 +117,10 @@ class BRDF(Parametric, ABC):
     def _strength(self, xp: Any, wo: Array) -> Array:
         """Roughly what is reflected at `wo`, (...): by it a sum shares its samples among its terms."""
         return xp.ones_like(wo[..., 2])
+
+    def _lanes(self, *names: str) -> tuple[Array, ...]:
+        """The named parameters, which are no colours, with an axis for the channels: (...) -> (..., 1)."""
+        return tuple(to_numpy(getattr(self, name))[..., None] for name in names)
 
     @staticmethod
     def _mean(xp: Any, colour: Array, wo: Array) -> Array:

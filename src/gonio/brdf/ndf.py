@@ -59,7 +59,7 @@ class NDF(Parametric, ABC):
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class _Slopes(NDF):
+class Slopes(NDF):
     """Distributions whose slopes are stretched by alpha: along s by `alpha`, along t by `alpha_y` (default: alike)."""
 
     alpha: Array = 0.3
@@ -67,10 +67,9 @@ class _Slopes(NDF):
 
     bounds: ClassVar[dict[str, Bounds]] = {"alpha": Bounds(1e-4, 4.0), "alpha_y": Bounds(1e-4, 4.0)}
 
-    def widths(self, reference: Array) -> tuple[Array, Array]:
-        """(alpha_x, alpha_y), each (...), as arrays like `reference`."""
-        x = like(self.alpha, reference)
-        return x, x if self.alpha_y is None else like(self.alpha_y, reference)
+    def widths(self) -> tuple[Array, Array]:
+        """(alpha_x, alpha_y), each (...)."""
+        return self.alpha, self.alpha if self.alpha_y is None else self.alpha_y
 
     def pdf(self, h: Array, wo: Array) -> Array:
         xp, h, wo = floats(h, wo)
@@ -78,7 +77,7 @@ class _Slopes(NDF):
 
     def sample(self, wo: Array, u: Array) -> Array:
         xp, wo, u = floats(wo, u)
-        ax, ay = self.widths(wo)
+        ax, ay = (like(alpha, wo) for alpha in self.widths())
         # Stretched to alpha = 1 the surface is isotropic; normals stretch by the inverse transpose.
         shape = xp.zeros_like(wo[..., 2] * ax * ay * u[..., 0])
         view = normalise(xp.stack((ax * wo[..., 0] + shape, ay * wo[..., 1] + shape, wo[..., 2] + shape), axis=-1))
@@ -90,7 +89,7 @@ class _Slopes(NDF):
         """Normals (..., 3), of any length, of the facets with alpha = 1 that `wo` (..., 3) sees."""
 
 
-class GGX(_Slopes):
+class GGX(Slopes):
     """Trowbridge and Reitz's facets of half ellipsoids: `alpha` (...) along s and `alpha_y` along t, in [1e-4, 4].
 
     alpha is the width of the slopes; roughness in glTF and Disney is its square root.
@@ -98,14 +97,14 @@ class GGX(_Slopes):
 
     def D(self, h: Array) -> Array:
         xp, h = floats(h)
-        ax, ay = self.widths(h)
+        ax, ay = (like(alpha, h) for alpha in self.widths())
         t = (h[..., 0] / ax) ** 2 + (h[..., 1] / ay) ** 2 + h[..., 2] ** 2
         D = 1 / (math.pi * ax * ay * t * t)
         return xp.where(h[..., 2] > 0, D, xp.zeros_like(D))
 
     def projected_area(self, w: Array) -> Array:
         xp, w = floats(w)
-        ax, ay = self.widths(w)
+        ax, ay = (like(alpha, w) for alpha in self.widths())
         x, y, z = ax * w[..., 0], ay * w[..., 1], w[..., 2]
         return 0.5 * (z + xp.sqrt(x * x + y * y + z * z))
 
@@ -126,7 +125,7 @@ class GGX(_Slopes):
         return p[..., None] * first + q[..., None] * second + up[..., None] * wo
 
 
-class Beckmann(_Slopes):
+class Beckmann(Slopes):
     """Facets whose slopes are normally distributed: `alpha` (...) along s and `alpha_y` along t, in [1e-4, 4].
 
     alpha is sqrt(2) times the standard deviation of the slopes.
@@ -134,7 +133,7 @@ class Beckmann(_Slopes):
 
     def D(self, h: Array) -> Array:
         xp, h = floats(h)
-        ax, ay = self.widths(h)
+        ax, ay = (like(alpha, h) for alpha in self.widths())
         up = h[..., 2] > 0
         z = xp.where(up, h[..., 2], xp.ones_like(h[..., 2]))
         e = ((h[..., 0] / ax) ** 2 + (h[..., 1] / ay) ** 2) / (z * z)
@@ -145,7 +144,7 @@ class Beckmann(_Slopes):
 
     def projected_area(self, w: Array) -> Array:
         xp, w = floats(w)
-        ax, ay = self.widths(w)
+        ax, ay = (like(alpha, w) for alpha in self.widths())
         x, y, z = ax * w[..., 0], ay * w[..., 1], w[..., 2]
         s = xp.sqrt(xp.clip(x * x + y * y, xp.finfo(w.dtype).tiny ** 0.5, None))
         a = z / s

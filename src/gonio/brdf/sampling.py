@@ -2,7 +2,7 @@
 
     cosine:   p(w) = cos theta / pi                          z^2 = 1 - u_0,  phi = 2 pi u_1
     lobe:     p(w) = (s + 1) / (2 pi) (a.w)^s, a.w > 0       (a.w)^(s+1) = 1 - u_0
-    mirror:   wi = 2 (wo.h) h - wo,   p(wi) = p(h) / (4 abs(wo.h))
+    mirror:   wi = 2 (wo.h) h - wo                           p(wi) = p(h) / (4 abs(wo.h))
 
 All are differentiable in u and in their parameters.
 """
@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 
 from ..arrays import Array, floats
-from ..directions import dot
+from ..directions import dot, half_vector
 from ..frames import frame, to_world
 
 
@@ -41,6 +41,13 @@ def mirrored(wo: Array, h: Array) -> Array:
     """`wo` mirrored at facets whose normal is `h`: wi (..., 3)."""
     _, wo, h = floats(wo, h)
     return 2 * dot(wo, h)[..., None] * h - wo
+
+
+def facet_between(wi: Array, wo: Array) -> Array:
+    """The normal (..., 3) of the facet that mirrors wo to wi, on its upper side: the half vector or its opposite."""
+    xp, wi, wo = floats(wi, wo)
+    h = half_vector(wi, wo)
+    return xp.where((h[..., 2] < 0)[..., None], -h, h)
 
 
 def power(xp: Array, base: Array, exponent: Array) -> Array:
