@@ -1,0 +1,147 @@
+"""Images of a shape with one reflectance under any light, by the forward model of `reflection.py`.
+
+    pixel = mean over its rays of  B(x, wo) where the ray meets the shape,  L(ray) where it does not
+
+Light comes straight from the light's beams: an environment map as so many of them that cover it, the same for every
+pixel and every run, so that there is no noise. Light between surfaces is not here.
+
+The image is made in tiles, on threads; memory stays bounded by the tiles in work, whatever the image and the samples.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor, as_completed
+
+import numpy as np
+
+from ..arrays import to_numpy
+from ..brdf.model import BRDF
+from ..cameras import Camera
+from ..errors import ArrayError, ParameterError
+from ..lights.environment import Environment
+from ..lights.model import Beams, Light
+from ..lights.points import Lights
+from ..reflection import processors, radiance
+from ..shapes.view import Shape
+
+# Neighbouring pixels have neighbouring normals, so that a small tile leaves out nearly half the sky at once; with few
+# beams larger tiles waste less on their making.
+TILE = 16
+LARGEST_TILE = 128
+PAIRS = 1 << 21
+
+
+def render(
+    shape: Shape,
+    material: BRDF,
+    light: Light,
+    camera: Camera,
+    *,
+    shadows: bool = False,
+    samples: int = 1024,
+    supersample: int = 1,
+    background: bool = True,
+    progress: Callable[[int, int], None] | None = None,
+    threads: int | None = None,
+    out: np.ndarray | None = None,
+) -> np.ndarray:
+    """The radiance (rows, columns, 3), linear float32, that `camera` sees of `shape`.
+
+    `shadows` traces whether the shape stands between its points and the light. `samples` is the most beams taken of
+    the light for each ray, `supersample` the rays a pixel along each side. Where nothing is met, environments are
+    seen if `background`, and black otherwise; `shape.view(camera).mask` tells the two apart.
+
+    `progress(done, total)` is called in pixels, from the calling thread, after each tile. Ctrl-C, and whatever
+    `progress` raises, ends the work soon and passes through; finished tiles stand in `out` (rows, columns, 3)
+    float32 where one is given, which is then also what is returned.
+
+    Raises `ParameterError` for counts below one, `ArrayError` for an `out` that does not fit.
+    """
+    for name, value in (("samples", samples), ("supersample", supersample)):
+        if int(value) != value or value < 1:
+            raise ParameterError(f"{name} = {value} is not a whole number >= 1.")
+    rows, columns = camera.size
+    if out is None:
+        out = np.zeros((rows, columns, 3), dtype=np.float32)
+    elif out.shape != (rows, columns, 3) or out.dtype != np.float32:
+        raise ArrayError(f"out is {out.dtype} {out.shape}; float32 {(rows, columns, 3)} is wanted.")
+    # Distant beams are made once; a near light's at each point. The first ray also builds the ray tracer, once.
+    shape.trace(*camera.rays(np.array([[0.5, 0.5]])))
+    source: Light | Beams = light.beams(budget=samples) if light.distant else light
+    count = source.irradiance.shape[-2] if isinstance(source, Beams) else samples
+    edge = _edge(count * supersample**2)
+
+    def tile(corner: tuple[int, int]) -> int:
+        r, c = corner
+        some = (slice(r, min(r + edge, rows)), slice(c, min(c + edge, columns)))
+        x, y = (
+            np.arange(part.start * supersample, part.stop * supersample) / supersample + 0.5 / supersample
+            for part in (some[1], some[0])
+        )
+        rays = camera.rays(np.stack(np.meshgrid(x, y), axis=-1))
+        colour = _seen(shape, material, light, source, rays, shadows, samples, background)
+        shown = colour.reshape(len(y) // supersample, supersample, len(x) // supersample, supersample, 3)
+        out[some] = shown.mean(axis=(1, 3))
+        return (some[0].stop - r) * (some[1].stop - c)
+
+    corners = [(r, c) for r in range(0, rows, edge) for c in range(0, columns, edge)]
+    done = 0
+    pool = ThreadPoolExecutor(processors() if threads is None else threads)
+    try:
+        for finished in as_completed([pool.submit(tile, corner) for corner in corners]):
+            done += finished.result()
+            if progress is not None:
+                progress(done, rows * columns)
+    finally:
+        pool.shutdown(cancel_futures=True)
+    return out
+
+
+def _seen(
+    shape: Shape,
+    material: BRDF,
+    light: Light,
+    source: Light | Beams,
+    rays: tuple[np.ndarray, np.ndarray],
+    shadows: bool,
+    samples: int,
+    background: bool,
+) -> np.ndarray:
+    """What the rays (..., 3) see: (..., 3)."""
+    view = shape.trace(*rays)
+    m = view.mask
+    colour = np.zeros((*m.shape, 3))
+    if background and not m.all():
+        colour[~m] = _beyond(light, rays[1][~m])
+    if m.any():
+
+        def arriving(x: np.ndarray, w: np.ndarray, distance: np.ndarray) -> np.ndarray:
+            return ~shape.occluded(x, w, distance)
+
+        colour[m] = radiance(
+            material,
+            source,
+            view.frames[m],
+            view.wo[m],
+            view.lifted[m],
+            visibility=arriving if shadows else None,
+            budget=samples,
+            threads=1,
+        )
+    return colour
+
+
+def _beyond(light: Light, w: np.ndarray) -> np.ndarray | float:
+    """Radiance (N, C) that arrives along `w` (N, 3) from beyond the shape; lights without extent are not seen."""
+    if isinstance(light, Lights):
+        return sum((_beyond(part, w) for part in light.lights), 0.0)
+    if isinstance(light, Environment):
+        return to_numpy(light.radiance(w))
+    return 0.0
+
+
+def _edge(pairs: int) -> int:
+    """The tile's side in pixels, a power of two, where each pixel takes `pairs` pairs of a point and a beam."""
+    return int(min(max(2 ** round(math.log2(max(PAIRS / pairs, 1)) / 2), TILE), LARGEST_TILE))
