@@ -190,6 +190,18 @@ def test_the_orientation_tag_of_a_tiff_turns_it_upright(tmp_path):
         assert (gn.image_info(path).rows, gn.image_info(path).columns) == (2, 3)
 
 
+def test_tiffs_that_tifffile_leaves_to_opencv_are_turned_alike(tmp_path):
+    pillow = pytest.importorskip("PIL.Image")
+    codes = PATTERN.astype(np.uint8)
+    stored = np.ascontiguousarray(codes[::-1].swapaxes(0, 1))  # orientation 6 or 8, by which corner comes first
+    for orientation, expected in ((6, codes[::-1, ::-1]), (8, codes)):
+        pillow.fromarray(stored).save(tmp_path / "a.tif", compression="tiff_lzw", tiffinfo={274: orientation})
+        np.testing.assert_array_equal(read_raster(tmp_path / "a.tif").samples, expected)
+    pillow.fromarray(np.dstack([codes, codes[..., 0]])).save(tmp_path / "b.tif", compression="tiff_lzw")
+    with pytest.raises(FileError, match=r"b\.tif: alpha is not read from LZW TIFF\. Save it deflated"):
+        gn.read_image(tmp_path / "b.tif")
+
+
 def test_separate_planes_and_big_endian_tiffs_are_read(tmp_path):
     image = PATTERN.astype(np.float32)
     tifffile.imwrite(tmp_path / "a.tif", np.moveaxis(image, -1, 0), photometric="rgb", planarconfig="separate")

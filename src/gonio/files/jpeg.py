@@ -13,11 +13,12 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import FileError
-from .raster import ImageInfo, Raster, decoding, from_bgr, require_size, truncated
+from .raster import ImageInfo, Raster, by_opencv, decoding, require_size, truncated
 
 MAGIC = (b"\xff\xd8\xff",)
 _SCAN_ENDS = re.compile(rb"\xff[^\x00\xd0-\xd7\xff]")  # a marker other than a stuffed byte or a restart
 _FRAMES = {0xC0 + k for k in range(16)} - {0xC4, 0xC8, 0xCC}
+_MOST_PIXELS = 512  # in one byte: a block of 8 x 8 takes a bit at least
 _NAMES = {1: ("Y",), 3: ("R", "G", "B"), 4: ("C", "M", "Y", "K")}
 
 
@@ -35,11 +36,10 @@ def read(path: Path) -> Raster:
     rows, columns, channels = _frame(path, data, whole=True)
     if channels == 4:
         raise FileError(f"{path} is in CMYK, ink and not light. Save it as RGB.")
-    with decoding(path):
-        pixels = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_ANYCOLOR)
     if _orientation(path) >= 5:
         rows, columns = columns, rows
-    return Raster(from_bgr(path, pixels, rows, columns)[0])
+    samples, _ = by_opencv(path, np.frombuffer(data, np.uint8), cv2.IMREAD_ANYCOLOR, rows, columns)
+    return Raster(samples)
 
 
 def _orientation(path: Path) -> int:
@@ -74,6 +74,8 @@ def _frame(path: Path, data: bytes, whole: bool) -> tuple[int, int, int]:
                     f"{path}: JPEG of {bits} bits and {channels} channels is not read, only of 8 and 1 or 3."
                 )
             require_size(path, rows, columns, channels)
+            if len(data) * _MOST_PIXELS < rows * columns:
+                raise truncated(path, f"{len(data)} bytes cannot hold {rows} x {columns} pixels")
             frame = rows, columns, channels
             if not whole:
                 return frame

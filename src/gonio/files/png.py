@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import FileError
-from .raster import Encoding, ImageInfo, Raster, decoding, from_bgr, opaque, require_size, truncated
+from .raster import Encoding, ImageInfo, Raster, by_opencv, opaque, require_size, truncated
 
 MAGIC = (b"\x89PNG\r\n\x1a\n",)
 _CHANNELS = {0: ("Y",), 2: ("R", "G", "B"), 3: ("R", "G", "B"), 4: ("Y", "A"), 6: ("R", "G", "B", "A")}
@@ -48,9 +48,7 @@ def read(path: Path) -> Raster:
         packed += len(body) if name == b"IDAT" else 0
     if rows * columns * _SAMPLES[kind] * bits // 8 > packed * _MOST_DEFLATED:
         raise truncated(path, f"{packed} bytes cannot hold {rows} x {columns} pixels")
-    with decoding(path):
-        pixels = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
-    samples, alpha = from_bgr(path, pixels, rows, columns)
+    samples, alpha = by_opencv(path, np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED, rows, columns)
     if samples.dtype != (np.uint16 if bits == 16 else np.uint8):
         raise FileError(f"{path}: {bits} bits were decoded as {samples.dtype}.")
     if kind in (0, 4) and samples.shape[2] == 3:

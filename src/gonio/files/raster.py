@@ -24,6 +24,11 @@ Encoding = str | float
 """How samples stand for light: "linear", "srgb", or the number g of a power law, light = sample^g."""
 
 
+# What codecs log of damaged files, the error says; without a handler it would go to stderr.
+for _name in ("tifffile", "exifread"):
+    logging.getLogger(_name).addHandler(logging.NullHandler())
+
+
 @dataclasses.dataclass(frozen=True, eq=False)
 class Raster:
     """One image as stored, its first row at the top.
@@ -82,8 +87,14 @@ def truncated(path: Path, what: str) -> FileError:
     return FileError(f"{path} is cut short: {what}. Copy or download it again.")
 
 
-def from_bgr(path: Path, pixels: np.ndarray | None, rows: int, columns: int) -> tuple[np.ndarray, np.ndarray | None]:
-    """OpenCV's (rows, columns[, 3 or 4]) in blue, green, red[, alpha] as samples (rows, columns, 1 or 3) and alpha."""
+def by_opencv(
+    path: Path, data: np.ndarray, flags: int, rows: int, columns: int
+) -> tuple[np.ndarray, np.ndarray | None]:
+    """OpenCV's decoding of a file's bytes, in red, green, blue: samples (rows, columns, 1 or 3), and alpha or None."""
+    import cv2
+
+    with decoding(path):
+        pixels = cv2.imdecode(data, flags)
     if pixels is None:
         raise FileError(f"{path} cannot be decoded: its pixels are damaged.")
     pixels = pixels.reshape(*pixels.shape[:2], -1)
@@ -99,18 +110,11 @@ def opaque(alpha: np.ndarray) -> bool:
 
 @contextlib.contextmanager
 def decoding(path: Path) -> Iterator[None]:
-    """Turns whatever a codec throws at a damaged file into a `FileError`, and keeps the codec's log off stderr."""
-    loggers = [logging.getLogger(name) for name in ("tifffile", "exifread")]
-    before = [logger.disabled for logger in loggers]
+    """Turns whatever a codec raises at a damaged file into a `FileError`."""
     try:
-        for logger in loggers:
-            logger.disabled = True
         yield
     except (GonioError, MemoryError, ImportError):
         raise
     except Exception as error:  # codecs raise what they please: RuntimeError, KeyError, struct.error, ...
         reason = " ".join(str(error).split()) or type(error).__name__
         raise FileError(f"{path} cannot be decoded: {reason:.200}") from error
-    finally:
-        for logger, disabled in zip(loggers, before, strict=True):
-            logger.disabled = disabled

@@ -6,17 +6,21 @@ Floats are linear; no tag in use states the curve of integer codes. Not here: se
 
 from __future__ import annotations
 
+import threading
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..errors import FileError
-from .raster import ImageInfo, Raster, decoding, from_bgr, opaque, require_size, truncated
+from .raster import ImageInfo, Raster, by_opencv, decoding, opaque, require_size, truncated
 
 MAGIC = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
+_quiet = threading.Lock()
 _DTYPES = ("uint8", "uint16", "float16", "float32", "float64")
-_DNG_VERSION, _ORIENTATION, _UNASSOCIATED = 50706, 274, 2
+_DNG_VERSION, _ORIENTATION = 50706, 274
+_ASSOCIATED = 1  # extra samples that colours are multiplied by
+_MOST_PACKED = 4096  # LZW and deflate pack no more bytes into one
 
 
 def is_raw(path: Path) -> bool:
@@ -51,7 +55,8 @@ def read(path: Path) -> Raster:
         if end > tif.filehandle.size or not all(page.databytecounts) or not page.dataoffsets:
             raise truncated(path, f"pixels should end at byte {end}, the file at {tif.filehandle.size}")
         rows, columns, channels, dtype = page.imagelength, page.imagewidth, page.samplesperpixel, page.dtype
-        if page.compression == 1 and sum(page.databytecounts) < rows * columns * channels * dtype.itemsize:
+        packed = sum(page.databytecounts) * (1 if page.compression == 1 else _MOST_PACKED)
+        if packed < rows * columns * channels * dtype.itemsize:
             raise truncated(path, f"{sum(page.databytecounts)} bytes cannot hold {rows} x {columns} pixels")
         extra = [int(e) for e in page.extrasamples]
         orientation = _orientation(page)
@@ -64,8 +69,12 @@ def read(path: Path) -> Raster:
         except (ValueError, KeyError, ImportError) as error:
             if "imagecodecs" not in str(error) and not isinstance(error, ImportError):
                 raise
-            samples, alpha = _by_opencv(path, rows, columns, dtype)
-    if extra and extra[0] != _UNASSOCIATED and alpha is not None:
+            if extra:
+                raise FileError(
+                    f"{path}: alpha is not read from {page.compression.name} TIFF. Save it deflated."
+                ) from None
+            samples, alpha = _packed(path, page, tif.byteorder), None
+    if extra[:1] == [_ASSOCIATED] and alpha is not None:
         if samples.dtype.kind == "u" and not opaque(alpha):
             raise FileError(f"{path}: its colours are multiplied by alpha before encoding. Save it without alpha.")
         alpha = None
@@ -100,14 +109,25 @@ def _page(path: Path, tif: Any) -> Any:
     return page
 
 
-def _by_opencv(path: Path, rows: int, columns: int, dtype: np.dtype[Any]) -> tuple[np.ndarray, np.ndarray | None]:
+def _packed(path: Path, page: Any, byteorder: str) -> np.ndarray:
     import cv2
 
-    pixels = cv2.imdecode(np.fromfile(path, np.uint8), cv2.IMREAD_UNCHANGED)
-    samples, alpha = from_bgr(path, pixels, rows, columns)
-    if samples.dtype != dtype:
-        raise FileError(f"{path}: {dtype} samples were decoded as {samples.dtype}.")
-    return samples, alpha
+    data = np.fromfile(path, np.uint8)
+    tag = page.tags.get(_ORIENTATION)
+    if tag is not None:  # OpenCV would turn the pixels
+        data[tag.valueoffset : tag.valueoffset + 2] = np.array([1], f"{byteorder}u2").view(np.uint8)
+    with _quiet:  # libtiff speaks through OpenCV's log, which has one level for all threads
+        log = cv2.utils.logging
+        level = log.setLogLevel(log.LOG_LEVEL_SILENT)
+        try:
+            samples, _ = by_opencv(path, data, cv2.IMREAD_UNCHANGED, page.imagelength, page.imagewidth)
+        finally:
+            log.setLogLevel(level)
+    if samples.dtype != page.dtype or samples.shape[2] != page.samplesperpixel:
+        raise FileError(
+            f"{path}: {page.samplesperpixel} x {page.dtype} were decoded as {samples.dtype}{samples.shape}."
+        )
+    return samples
 
 
 def _orientation(page: Any) -> int:
