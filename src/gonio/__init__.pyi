@@ -1,3 +1,4 @@
+from .brdf.albedo import albedo as albedo
 from .brdf.diffuse import Lambert as Lambert
 from .brdf.diffuse import OrenNayar as OrenNayar
 from .brdf.fresnel import Conductor as Conductor
@@ -6,8 +7,8 @@ from .brdf.fresnel import Schlick as Schlick
 from .brdf.kajiya_kay import KajiyaKay as KajiyaKay
 from .brdf.lafortune import Lafortune as Lafortune
 from .brdf.microfacet import Microfacet as Microfacet
-from .brdf.ndf import Beckmann as Beckmann
 from .brdf.ndf import GGX as GGX
+from .brdf.ndf import Beckmann as Beckmann
 from .brdf.phong import BlinnPhong as BlinnPhong
 from .brdf.phong import ModifiedPhong as ModifiedPhong
 from .brdf.phong import Phong as Phong
@@ -65,3 +66,5 @@ from .sphere.transform import synthesis as synthesis
 from .sphere.transform import synthesis_spin as synthesis_spin
 from .sphere.wigner import wigner_D as wigner_D
 from .sphere.wigner import wigner_d as wigner_d
+
+__version__: str
