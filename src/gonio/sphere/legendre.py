@@ -4,8 +4,8 @@
     g_l lambda_{l+1} = (cos theta - b_l) lambda_l - g_{l-1} lambda_{l-1},      b_l = -m s / (l (l + 1))
     g_l = sqrt((l + 1)^2 - m^2) sqrt((l + 1)^2 - s^2) / ((l + 1) sqrt((2 l + 1) (2 l + 3)))
 
-starting at l = max(m, abs(s)) with a product of powers of cos and sin of theta/2. Only m >= 0 is needed: those at -m are
-those at m seen from the other pole, d^l_{-m,-s}(theta) = (-1)^(l+s) d^l_{m,-s}(pi - theta).
+starting at l = max(m, abs(s)) with a product of powers of cos and sin of theta/2. Only m >= 0 is needed: the functions
+at -m are those at m seen from the other pole, d^l_{-m,-s}(theta) = (-1)^(l+s) d^l_{m,-s}(pi - theta).
 
 Without spin two steps make one in cos^2 theta, on the northern rings alone: the even l - m are symmetric about the
 equator, and the odd ones are cos theta times a sum over the even ones (Ishioka 2018, "A new recurrence formula for
@@ -75,7 +75,7 @@ def spin_recursion(grid: Grid, degree: int, spin: int) -> Recursion:
 
 @lru_cache(maxsize=8)
 def folded_recursion(grid: Grid, degree: int) -> Recursion:
-    """(-1)^m lambda_lm (no Condon-Shortley sign) for l = m, m + 2, ..., at the northern rows, the equator among them."""
+    """(-1)^m lambda_lm (no Condon-Shortley sign) for l = m, m + 2, ..., at the northern rows and the equator."""
     m, l = _steps(degree, 0)
     l = m + 2 * (l - m)[:, : degree // 2 + 1]
     gg = _coupling(l, m, 0) * _coupling(l + 1, m, 0)
@@ -128,7 +128,8 @@ def _recursion(
         padded.append(values)
     start, level = _start(theta, degree, spin, sign)
     first, stop = _range(theta, degree, spin)
-    return Recursion(start, level, *padded, inside.sum(axis=1), first, stop, t)
+    a, b, c = padded
+    return Recursion(start, level, a, b, c, inside.sum(axis=1), first, stop, t)
 
 
 def _start(theta: np.ndarray, degree: int, spin: int, sign: bool) -> tuple[np.ndarray, np.ndarray]:

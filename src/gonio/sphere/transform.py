@@ -82,7 +82,7 @@ def analysis_spin(values: Array, grid: Grid, degree: int, spin: int) -> Array:
 
 
 def synthesis_spin(coefficients: Array, grid: Grid, spin: int) -> Array:
-    """Complex values on `grid` of coefficients in the harmonics of `spin`: ((degree + 1)^2[, C]) -> (rows, columns[, C]).
+    """Complex values on `grid` of coefficients of `spin`: ((degree + 1)^2[, C]) -> (rows, columns[, C]).
 
     Coefficients below degree abs(spin) are ignored, since there are no such harmonics. Raises as `synthesis` does, and
     `ParameterError` where abs(spin) exceeds the degree.
