@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import FileError
-from .raster import ImageInfo, Raster, by_opencv, decoding, require_size, truncated
+from .raster import ImageInfo, Raster, by_opencv, require_size, truncated
 
 MAGIC = (b"\xff\xd8\xff",)
 _SCAN_ENDS = re.compile(rb"\xff[^\x00\xd0-\xd7\xff]")  # a marker other than a stuffed byte or a restart
@@ -24,8 +24,6 @@ _NAMES = {1: ("Y",), 3: ("R", "G", "B"), 4: ("C", "M", "Y", "K")}
 
 def info(path: Path) -> ImageInfo:
     rows, columns, channels = _frame(path, path.read_bytes(), whole=False)
-    if _orientation(path) >= 5:
-        rows, columns = columns, rows
     return ImageInfo("JPEG", rows, columns, _NAMES[channels], "uint8", None)
 
 
@@ -36,24 +34,14 @@ def read(path: Path) -> Raster:
     rows, columns, channels = _frame(path, data, whole=True)
     if channels == 4:
         raise FileError(f"{path} is in CMYK, ink and not light. Save it as RGB.")
-    if _orientation(path) >= 5:
-        rows, columns = columns, rows
     samples, _ = by_opencv(path, np.frombuffer(data, np.uint8), cv2.IMREAD_ANYCOLOR, rows, columns)
     return Raster(samples)
 
 
-def _orientation(path: Path) -> int:
-    """1 to 8 as in TIFF 6.0; 5 and above exchange rows and columns. OpenCV turns the pixels by the same tag."""
-    import exifread
-
-    with decoding(path), path.open("rb") as file:
-        tag = exifread.process_file(file, details=False).get("Image Orientation")
-    return int(tag.values[0]) if tag is not None and tag.values else 1
-
-
 def _frame(path: Path, data: bytes, whole: bool) -> tuple[int, int, int]:
-    """Rows, columns and channels of the frame header; where `whole`, after following the markers to the end."""
+    """Rows and columns of the upright picture, and channels; where `whole`, the markers are followed to the end."""
     frame = None
+    turned = False
     at = 2
     while at + 4 <= len(data) or data[at : at + 2] == b"\xff\xd9":
         if data[at] != 0xFF:
@@ -67,6 +55,8 @@ def _frame(path: Path, data: bytes, whole: bool) -> tuple[int, int, int]:
         (length,) = struct.unpack_from(">H", data, at + 2)
         if length < 2 or at + 2 + length > len(data):
             break
+        if marker == 0xE1:
+            turned = turned or _orientation(data[at + 4 : at + 2 + length]) >= 5
         if marker in _FRAMES and length >= 8:
             bits, rows, columns, channels = struct.unpack_from(">BHHB", data, at + 4)
             if bits != 8 or channels not in _NAMES:
@@ -76,7 +66,7 @@ def _frame(path: Path, data: bytes, whole: bool) -> tuple[int, int, int]:
             require_size(path, rows, columns, channels)
             if len(data) * _MOST_PIXELS < rows * columns:
                 raise truncated(path, f"{len(data)} bytes cannot hold {rows} x {columns} pixels")
-            frame = rows, columns, channels
+            frame = (columns, rows, channels) if turned else (rows, columns, channels)
             if not whole:
                 return frame
         at += 2 + length
@@ -88,3 +78,20 @@ def _frame(path: Path, data: bytes, whole: bool) -> tuple[int, int, int]:
     if frame is None or data[at : at + 2] != b"\xff\xd9":
         raise truncated(path, "there is no end-of-image marker")
     return frame
+
+
+def _orientation(segment: bytes) -> int:
+    """Of an EXIF segment, 1 to 8 as in TIFF 6.0: from 5 on, rows and columns change places when OpenCV turns them."""
+    order = {b"Exif\0\0II": "<", b"Exif\0\0MM": ">"}.get(segment[:8])
+    if order is None:
+        return 1
+    try:
+        (directory,) = struct.unpack_from(order + "I", segment, 10)
+        (count,) = struct.unpack_from(order + "H", segment, 6 + directory)
+        for k in range(count):
+            tag, kind, _, value = struct.unpack_from(order + "HHIH", segment, 8 + directory + 12 * k)
+            if (tag, kind) == (274, 3):
+                return int(value) if 1 <= value <= 8 else 1
+    except struct.error:  # a damaged tag turns nothing
+        pass
+    return 1

@@ -24,9 +24,8 @@ Encoding = str | float
 """How samples stand for light: "linear", "srgb", or the number g of a power law, light = sample^g."""
 
 
-# What codecs log of damaged files, the error says; without a handler it would go to stderr.
-for _name in ("tifffile", "exifread"):
-    logging.getLogger(_name).addHandler(logging.NullHandler())
+# What tifffile logs of damaged files, the error says; without a handler it would go to stderr.
+logging.getLogger("tifffile").addHandler(logging.NullHandler())
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
