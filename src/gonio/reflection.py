@@ -29,8 +29,8 @@ from .errors import ArrayError
 from .frames import require_rotation
 from .lights.model import Beams, Light
 
-# Pairs of a site and a beam in one block: their directions and values stay within a megabyte or two.
-PAIRS = 1 << 15
+# Pairs of a site and a beam in one block: their directions and values fit a core's cache.
+PAIRS = 1 << 14
 SITES = 256
 
 # (positions (N, 3), directions (N, 3), distance (N,)) -> (N,), as NumPy arrays: 1 or True where light arrives.
@@ -169,12 +169,19 @@ def _block(
         elif callable(visibility):
             weight = weight * _arriving(visibility, positions[part], w, distance[some], weight)  # type: ignore[index]
         f = brdf.evaluate(xp, wi, wo)
-        E = irradiance[some][:, None, :] if distant else irradiance[some]
-        if distant and f.shape[-1] == 1:
-            total = total + xp.permute_dims(f[..., 0] * weight, (1, 0)) @ E[:, 0, :]
-        else:
-            total = total + xp.sum(f * weight[..., None] * E, axis=0)
+        total = total + _summed(xp, f, weight, irradiance[some])
     return total
+
+
+def _summed(xp: Any, f: Array, weight: Array, E: Array) -> Array:
+    """sum_k f_k weight_k E_k, (P, C), of f (K, P, C), weight (K, P) and E (K, C) for all sites or (K, P, C)."""
+    if E.ndim == 3:
+        return xp.sum(f * weight[..., None] * E, axis=0)
+    # One matrix product a channel: no temporary of the size of f and E together.
+    if f.shape[-1] == 1:
+        return xp.permute_dims(xp.permute_dims(E, (1, 0)) @ (f[..., 0] * weight), (1, 0))
+    colours = range(f.shape[-1])
+    return xp.stack(tuple(E[:, c % E.shape[-1]] @ (f[..., c] * weight) for c in colours), axis=-1)
 
 
 def _above(xp: Any, directions: Array, normals: Array) -> Array | None:

@@ -16,13 +16,13 @@ import numpy as np
 
 from .._kernels import bvh
 from ..arrays import Array, require_finite, to_numpy
-from ..directions import dot, require_unit
+from ..directions import cross, dot, require_unit
 from ..errors import ArrayError, MemoryLimitError
 
 MEMORY_LIMIT = 4 << 30
 # In units of the scaled box. Single precision places points there to 6e-8; this is far above it, and unseen.
 CLEARANCE = 1e-5
-BLOCK = 1 << 18  # rays at once: their temporaries stay small beside the scene
+BLOCK = 1 << 14  # rays at once, so that their temporaries stay in the cache
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -115,13 +115,13 @@ class Scene:
         """The first faces that the rays from `origins` (..., 3) along unit `directions` (..., 3) meet."""
         origins, directions, shape = _rays(origins, directions)
         face = np.empty(len(origins), dtype=np.int64)
+        distance = np.full(len(face), np.inf)
+        weights = np.full((len(face), 3), np.nan)
         for part in _blocks(len(face)):
             near, w, _ = self._scaled(origins[part], directions[part])
             face[part] = self._tracer.closest(near, w)
-        hit = np.flatnonzero(face >= 0)
-        distance = np.full(len(face), np.inf)
-        weights = np.full((len(face), 3), np.nan)
-        distance[hit], weights[hit] = _solve(origins[hit], directions[hit], self.corners[face[hit]])
+            hit = part.start + np.flatnonzero(face[part] >= 0)
+            distance[hit], weights[hit] = _solve(origins[hit], directions[hit], self.corners[face[hit]])
         return Hits(distance.reshape(shape), face.reshape(shape), weights.reshape(*shape, 3))
 
     def occluded(self, origins: Array, directions: Array, distance: Array = np.inf) -> np.ndarray:
@@ -189,12 +189,12 @@ def _solve(o: np.ndarray, d: np.ndarray, corners: np.ndarray) -> tuple[np.ndarra
     Weights are kept within the triangle, which single precision may just have missed.
     """
     a, e1, e2 = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    p = np.cross(d, e2)
+    p = cross(d, e2)
     det = dot(e1, p)
     det = np.where(det == 0, np.finfo(np.float64).tiny, det)
     s = o - a
     u = np.clip(np.nan_to_num(dot(s, p) / det), 0, 1)
-    v = np.clip(np.nan_to_num(dot(d, np.cross(s, e1)) / det), 0, 1 - u)
+    v = np.clip(np.nan_to_num(dot(d, cross(s, e1)) / det), 0, 1 - u)
     met = a + u[:, None] * e1 + v[:, None] * e2
     return dot(met - o, d), np.stack((1 - u - v, u, v), axis=-1)
 
