@@ -68,3 +68,4 @@ from .sphere.wigner import wigner_D as wigner_D
 from .sphere.wigner import wigner_d as wigner_d
 
 __version__: str
+from .files.meshes import read_mesh as read_mesh

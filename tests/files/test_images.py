@@ -1,6 +1,7 @@
 """Image files of every format: what comes in is linear, whole and the right way up."""
 
 import struct
+import sys
 import warnings
 import zlib
 
@@ -353,9 +354,35 @@ def test_what_cannot_be_written_is_refused_before_a_file_appears(tmp_path, name,
 # Real files
 
 
-def test_camera_raw_needs_its_extra_or_reads(tmp_path):
-    (tmp_path / "a.nef").write_bytes(b"II*\0" + bytes(60))
-    with pytest.raises((MissingExtraError, FileError), match=r"pip install 'gonio\[raw\]'|a\.nef cannot be decoded"):
+def dng(path, colour):
+    """A uniform colour behind a Bayer mosaic; a camera whose colours are linear sRGB's, saturated at 4000."""
+    mosaic = np.empty((32, 48), np.uint16)
+    for row, column, channel in ((0, 0, 0), (0, 1, 1), (1, 0, 1), (1, 1, 2)):
+        mosaic[row::2, column::2] = colour[channel] * 4000
+    xyz_to_rgb = [32404542, -15371385, -4985314, -9692660, 18760108, 415560, 556434, -2040259, 10572252]
+    matrix = tuple(k for m in xyz_to_rgb for k in (m, 10**7))
+    tags = [(50706, 1, 4, (1, 4, 0, 0)), (33421, 3, 2, (2, 2)), (33422, 1, 4, (0, 1, 1, 2)), (50714, 3, 1, 0)]
+    tags += [(50717, 3, 1, 4000), (50721, 10, 9, matrix), (50728, 5, 3, (1, 1, 1, 1, 1, 1)), (50778, 3, 1, 21)]
+    tags += [(50708, 2, 6, "gonio")]
+    tifffile.imwrite(path, mosaic, photometric=32803, extratags=[(*tag, True) for tag in tags], metadata=None)
+
+
+def test_camera_raw_is_linear_from_black_to_saturation(tmp_path):
+    pytest.importorskip("rawpy")
+    dng(tmp_path / "a.dng", (0.2, 0.5, 0.3))
+    dng(tmp_path / "a.tif", (0.2, 0.5, 0.3))  # a raw file under another name is still one
+    for name in ("a.dng", "a.tif"):
+        # LibRaw's fixed-point matrix and 16-bit output are right to some codes.
+        np.testing.assert_allclose(
+            gn.read_image(tmp_path / name)[8:-8, 8:-8], np.full((16, 32, 3), (0.2, 0.5, 0.3)), atol=2e-4
+        )
+        assert gn.image_info(tmp_path / name).format == "camera raw"
+
+
+def test_camera_raw_names_the_extra_that_it_needs(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "rawpy", None)  # as where it is not installed
+    (tmp_path / "a.nef").write_bytes(bytes(60))
+    with pytest.raises(MissingExtraError, match=r"a\.nef is a camera's raw file.*pip install 'gonio\[raw\]'"):
         gn.read_image(tmp_path / "a.nef")
 
 

@@ -112,7 +112,7 @@ def decoding(path: Path) -> Iterator[None]:
     """Turns whatever a codec raises at a damaged file into a `FileError`."""
     try:
         yield
-    except (GonioError, MemoryError, ImportError):
+    except (GonioError, MemoryError):
         raise
     except Exception as error:  # codecs raise what they please: RuntimeError, KeyError, struct.error, ...
         reason = " ".join(str(error).split()) or type(error).__name__

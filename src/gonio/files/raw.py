@@ -23,7 +23,7 @@ SUFFIXES = frozenset((
 
 
 def info(path: Path) -> ImageInfo:
-    with decoding(path), _library().imread(str(path)) as raw:
+    with decoding(path), _library(path).imread(str(path)) as raw:
         sizes = raw.sizes
         attributes = {"black": list(raw.black_level_per_channel), "white": raw.white_level}
         names = tuple(raw.color_desc.decode())
@@ -32,7 +32,7 @@ def info(path: Path) -> ImageInfo:
 
 def read(path: Path) -> Raster:
     """uint16 codes, of which the highest is the sensor's saturation."""
-    library = _library()
+    library = _library(path)
     with decoding(path), library.imread(str(path)) as raw:
         require_size(path, raw.sizes.raw_height, raw.sizes.raw_width)
         pixels = raw.postprocess(
@@ -47,9 +47,11 @@ def read(path: Path) -> Raster:
     return Raster(np.ascontiguousarray(pixels), "linear")
 
 
-def _library() -> Any:
+def _library(path: Path) -> Any:
     try:
         import rawpy
     except ImportError as error:
-        raise MissingExtraError("Camera raw files need rawpy: pip install 'gonio[raw]'") from error
+        raise MissingExtraError(
+            f"{path} is a camera's raw file, which needs rawpy: pip install 'gonio[raw]'"
+        ) from error
     return rawpy
