@@ -14,7 +14,7 @@ from numba import njit
 LAMBERT, OREN_NAYAR, PHONG, MODIFIED_PHONG, BLINN_PHONG, WARD, BOUNDED_WARD = range(7)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def one_colour(wi, wo, p, steps, out, model):  # type: ignore[no-untyped-def]
     """f = colour x lobe; parameters: colour, a, b (what a and b mean: `_lobe`)."""
     rows, columns, channels = out.shape
@@ -32,7 +32,7 @@ def one_colour(wi, wo, p, steps, out, model):  # type: ignore[no-untyped-def]
                 out[i, j, c] = p[q + 3 * c] * value
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _lobe(model, ix, iy, iz, ox, oy, oz, a, b):  # type: ignore[no-untyped-def]
     if model == LAMBERT:
         return 1 / math.pi
@@ -58,7 +58,7 @@ def _lobe(model, ix, iy, iz, ox, oy, oz, a, b):  # type: ignore[no-untyped-def]
     return lobe * (x * x + y * y + z2) / (z2 * z2)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def lafortune(wi, wo, p, steps, out):  # type: ignore[no-untyped-def]
     """Parameters: C_x, C_y, C_z, n."""
     rows, columns, channels = out.shape
@@ -76,7 +76,7 @@ def lafortune(wi, wo, p, steps, out):  # type: ignore[no-untyped-def]
                 out[i, j, c] = cosine ** p[k + 3] if lit and cosine > 0 else 0.0
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def kajiya_kay(wi, wo, p, steps, out):  # type: ignore[no-untyped-def]
     """Parameters: what the diffuse and the specular term are multiplied by, s."""
     rows, columns, channels = out.shape
@@ -97,7 +97,7 @@ def kajiya_kay(wi, wo, p, steps, out):  # type: ignore[no-untyped-def]
                 out[i, j, c] = p[q + 3 * c] * diffuse + p[q + 3 * c + 1] * specular
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def torrance_sparrow(wi, wo, p, steps, out):  # type: ignore[no-untyped-def]
     """Parameters: K_d / pi, K_s / (4 pi sigma^2 F(mu, 0)), mu, 1 / sigma."""
     rows, columns, channels = out.shape
@@ -118,7 +118,7 @@ def torrance_sparrow(wi, wo, p, steps, out):  # type: ignore[no-untyped-def]
                 out[i, j, c] = p[q + 4 * c] * diffuse + p[q + 4 * c + 1] * specular
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def dielectric(c, eta):  # type: ignore[no-untyped-def]
     """MS 3 at a cosine in [0, 1]."""
     g = math.sqrt(max(eta * eta - 1 + c * c, 1e-300))

@@ -41,6 +41,9 @@ class Sum(BRDF):
     def _f(self, xp: Any, wi: Array, wo: Array) -> Array:
         return functools.reduce(operator.add, (term._f(xp, wi, wo) for term in self.terms))
 
+    def lobes(self) -> tuple[BRDF, ...]:
+        return tuple(lobe for term in self.terms for lobe in term.lobes())
+
     def _strength(self, xp: Any, wo: Array) -> Array:
         return functools.reduce(operator.add, (term._strength(xp, wo) for term in self.terms))
 
@@ -87,6 +90,9 @@ class Scaled(BRDF):
 
     def _f(self, xp: Any, wi: Array, wo: Array) -> Array:
         return like(self.factor, wi) * self.model._f(xp, wi, wo)
+
+    def lobes(self) -> tuple[BRDF, ...]:
+        return tuple(Scaled(lobe, self.factor) for lobe in self.model.lobes())
 
     def _strength(self, xp: Any, wo: Array) -> Array:
         return self._mean(xp, self.factor, wo) * self.model._strength(xp, wo)

@@ -19,6 +19,7 @@ import numpy as np
 from .._kernels import brdf as kernels
 from ..arrays import Array, floats, like, to_numpy
 from ..errors import ParameterError
+from .combine import Scaled
 from .model import BRDF, Bounds
 from .pairs import through
 from .sampling import lobe_density, lobe_direction, power
@@ -59,6 +60,14 @@ class Lafortune(BRDF):
 
     def _compiled(self, wi: Array, wo: Array) -> Array:
         return through(kernels.lafortune, wi, wo, (self.cx, self.cy, self.cz, self.n))
+
+    def lobes(self) -> tuple[BRDF, ...]:
+        numbers = [getattr(self, name) for name in self.bounds]
+        count = max((p.shape[-1] for p in numbers if p.ndim), default=1)
+        if count == 1:
+            return (self,)
+        one = [[p[..., c % p.shape[-1], None] if p.ndim else p for p in numbers] for c in range(count)]
+        return tuple(Scaled(Lafortune(*one[c]), np.eye(count)[c]) for c in range(count))
 
     def _axes(self, xp: Any, wo: Array) -> tuple[Array, Array, Array]:
         """Each channel's axis (..., C, 3), unit, its exponent (..., C), and the length of C wo (..., C)."""

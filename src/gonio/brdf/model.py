@@ -114,6 +114,10 @@ class BRDF(Parametric, ABC):
         cosine = cos_theta(wi) + xp.zeros_like(cos_theta(wo))
         return xp.where(cosine > 0, cosine / np.pi, xp.zeros_like(cosine))
 
+    def lobes(self) -> tuple[BRDF, ...]:
+        """Models of one lobe each whose sum is this one: each may be sampled and integrated by itself."""
+        return (self,)
+
     def _strength(self, xp: Any, wo: Array) -> Array:
         """Roughly what is reflected at `wo`, (...): by it a sum shares its samples among its terms."""
         return xp.ones_like(wo[..., 2])

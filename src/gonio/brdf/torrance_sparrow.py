@@ -17,6 +17,7 @@ from typing import Any, ClassVar
 from .._kernels import brdf as kernels
 from ..arrays import Array, floats, like, to_numpy
 from ..directions import dot
+from .diffuse import Lambert
 from .fresnel import Fresnel
 from .model import BRDF, Bounds
 from .pairs import through
@@ -52,6 +53,9 @@ class TorranceSparrow(BRDF):
         normal = ((mu - 1) / (mu + 1)) ** 2
         specular = to_numpy(self.ks) / (4 * math.pi * sigma * sigma * normal)
         return through(kernels.torrance_sparrow, wi, wo, (to_numpy(self.kd) / math.pi, specular, mu, 1 / sigma))
+
+    def lobes(self) -> tuple[BRDF, ...]:
+        return Lambert(self.kd), dataclasses.replace(self, kd=0.0)
 
     def _facing(self, xp: Any, wo: Array) -> Array:
         """F(mu, theta_o) / F(mu, 0), (...)."""
