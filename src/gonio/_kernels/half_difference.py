@@ -8,7 +8,8 @@ import numpy as np
 from numba import njit
 
 
-@njit(cache=True, nogil=True)
+# The divisors are lengths that cannot vanish above the surface; Python's check of each division costs time.
+@njit(cache=True, nogil=True, error_model="numpy")
 def lookup(values: np.ndarray, wi: np.ndarray, wo: np.ndarray, nearest: bool, out: np.ndarray) -> None:
     """Fills `out` (n, C) with the table `values` (H, D, P, C) at local directions `wi`, `wo` (n, 3).
 
