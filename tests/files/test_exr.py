@@ -184,6 +184,8 @@ def test_any_byte_of_a_header_may_be_wrong(tmp_path, image):
         ({}, "layers is empty"),
         ({"a": np.zeros((2, 2)), "b": np.zeros((2, 3))}, r"sizes \(2, 2\) and \(2, 3\)"),
         ({"a": np.zeros((2, 2, 4))}, r"shape \(2, 2, 4\)"),
+        ({"a": np.zeros((2, 2, 3)), "a.G": np.zeros((2, 2))}, "layer 'a' has channels of its own called a.G"),
+        ({"RGB": np.zeros((2, 2, 3)), "R": np.zeros((2, 2))}, "layer 'RGB' has channels of its own called R"),
         ({"": np.zeros((2, 2))}, "cannot be a layer's name"),
         ({"a": np.full((2, 2), -1)}, "whole numbers outside"),
         ({"a": np.zeros((2, 2), complex)}, "expected real numbers"),

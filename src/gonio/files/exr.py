@@ -25,7 +25,7 @@ from ..errors import FileError
 from .raster import ImageInfo, Raster, decoding, require_size, truncated
 
 MAGIC = (b"\x76\x2f\x31\x01",)
-_LONGEST_HEADER = 1 << 24  # previews and metadata of whole productions stay far below
+_LONGEST_HEADER = 1 << 22  # previews and the metadata of whole productions stay far below
 _DTYPES = ("uint32", "float16", "float32")
 _COMPRESSIONS = ("none", "RLE", "ZIPS", "ZIP", "PIZ", "PXR24", "B44", "B44A", "DWAA", "DWAB", "HTJ2K256", "HTJ2K32")
 _quiet = threading.Lock()
@@ -218,7 +218,10 @@ def _value(kind: str, body: bytes) -> Any:
 
 @contextlib.contextmanager
 def _silence() -> Iterator[None]:
-    """Keeps the library's reports of damage, which it writes itself, off the program's output; the error says it."""
+    """Keeps the library's reports of damage, which it writes itself, off the program's output; the error says it.
+
+    The descriptor is the process's: for the moment of the call, other threads' stderr is lost as well.
+    """
     with _quiet, contextlib.redirect_stdout(io.StringIO()):
         try:
             kept = os.dup(2)

@@ -31,6 +31,7 @@ from ..errors import (
     ClippedWarning,
     EncodingWarning,
     FileError,
+    GonioWarning,
     NegativeWarning,
     ParameterError,
 )
@@ -44,7 +45,6 @@ CLIPPED_SHARE = 1e-3
 _BY_CONTENT = (exr, hdr, jpeg, pfm, png, tiff)
 _BITS = {".exr": (32, 16), ".hdr": (32,), ".pic": (32,), ".pfm": (32,), ".png": (8, 16), ".tif": (32, 16, 8)}
 _BITS[".tiff"] = _BITS[".tif"]
-_HALF_MAX = float(np.finfo(np.float16).max)
 
 
 def read_image(path: str | os.PathLike[str], encoding: Encoding | None = None) -> np.ndarray:
@@ -63,18 +63,10 @@ def read_image(path: str | os.PathLike[str], encoding: Encoding | None = None) -
     _require_encoding(encoding)
     raster = read_raster(path)
     chosen = encoding if encoding is not None else raster.encoding
-    if chosen is None:
-        chosen = "srgb"
-        _warn(
-            EncodingWarning,
-            f"{path}: the file does not say how its {raster.samples.dtype} codes stand for light; taken for sRGB. "
-            "Say encoding='srgb' or what it is.",
-        )
-    if raster.alpha is not None:
-        _warn(AlphaWarning, f"{path}: transparency was left out; colours of transparent pixels may mean nothing.")
-    _warn_clipped(path, raster.samples)
-    image = _light(raster.samples, chosen)
-    _check(path, image)
+    image = _light(raster.samples, "srgb" if chosen is None else chosen)
+    _require_finite(path, image)
+    for kind, message in _doubts(raster, image, chosen is None):
+        warnings.warn(f"{path}: {message}", kind, stacklevel=2)
     return np.repeat(image, 3, axis=2) if image.shape[2] == 1 else image
 
 
@@ -169,6 +161,12 @@ def write_layers(path: str | os.PathLike[str], layers: Mapping[str, Array]) -> N
     if not layers:
         raise ArrayError("layers is empty. Give at least one image.")
     arrays = {name: _layer(name, to_numpy(image)) for name, image in layers.items()}
+    for name, image in arrays.items():
+        channels = [f"{name}.{c}" if name != "RGB" else c for c in "RGB"] if image.ndim == 3 else []
+        if taken := set(channels) & set(arrays):
+            raise ArrayError(
+                f"layer {name!r} has channels of its own called {' and '.join(sorted(taken))}. Rename one."
+            )
     sizes = {a.shape[:2] for a in arrays.values()}
     if len(sizes) > 1:
         raise ArrayError(f"layers have sizes {' and '.join(map(str, sorted(sizes)))}; one file holds one size.")
@@ -231,38 +229,34 @@ def _encode(linear: np.ndarray, encoding: Encoding) -> np.ndarray:
     return np.asarray(np.sign(linear) * np.abs(linear) ** (1 / encoding))
 
 
-def _check(path: Path, image: np.ndarray) -> None:
+def _require_finite(path: Path, image: np.ndarray) -> None:
     good = np.isfinite(image)
     if not good.all():
         row, column, channel = (int(k) for k in np.argwhere(~good)[0])
         raise FileError(
             f"{path}: pixel [{row}, {column}], channel {channel}, is {image[row, column, channel]}; "
-            f"{np.count_nonzero(~good)} samples are not finite. Mend the file (read_layers reads it as it is)."
+            f"{np.count_nonzero(~good)} samples are not finite. Mend the file (read_raster reads it as it is)."
         )
-    least = float(image.min())
-    if least < 0:
+
+
+def _doubts(raster: Raster, image: np.ndarray, assumed: bool) -> Iterator[tuple[type[GonioWarning], str]]:
+    """What can be used but not trusted whole."""
+    samples = raster.samples
+    if assumed:
+        yield (
+            EncodingWarning,
+            f"the file does not say how its {samples.dtype} codes stand for light; taken for sRGB. "
+            "Say encoding='srgb' or what it is.",
+        )
+    if raster.alpha is not None:
+        yield AlphaWarning, "transparency was left out; colours of transparent pixels may mean nothing."
+    brightest = {"uint8": 255, "uint16": 65535, "float16": 65504}.get(str(samples.dtype))
+    clipped = np.count_nonzero((samples == brightest).any(axis=-1)) / samples[..., 0].size if brightest else 0
+    if clipped > CLIPPED_SHARE:
+        yield ClippedWarning, f"{clipped:.2%} of the pixels are at {brightest}, the most that the file can hold."
+    if (least := float(image.min())) < 0:
         share = np.count_nonzero((image < 0).any(axis=-1)) / image[..., 0].size
-        _warn(
-            NegativeWarning, f"{path}: {share:.3%} of the pixels are negative, down to {least:.4g}; kept as they are."
-        )
-
-
-def _warn_clipped(path: Path, samples: np.ndarray) -> None:
-    if samples.dtype.kind == "u":
-        brightest: float = np.iinfo(samples.dtype).max
-    elif samples.dtype == np.float16:
-        brightest = _HALF_MAX
-    else:
-        return
-    share = np.count_nonzero((samples == brightest).any(axis=-1)) / samples[..., 0].size
-    if share > CLIPPED_SHARE:
-        _warn(
-            ClippedWarning, f"{path}: {share:.2%} of the pixels are at {brightest:g}, the brightest the file can hold."
-        )
-
-
-def _warn(kind: type[Warning], message: str) -> None:
-    warnings.warn(message, kind, stacklevel=4 if kind in (ClippedWarning, NegativeWarning) else 3)
+        yield NegativeWarning, f"{share:.3%} of the pixels are negative, down to {least:.4g}; kept as they are."
 
 
 def _pixels(image: Array) -> np.ndarray:
