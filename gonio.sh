@@ -40,7 +40,8 @@ find_python() {
 }
 
 # Installs what lock $2 names, by hash, and gonio from this checkout; hatchling, which builds gonio, is in the lock.
-# The steps are chained because `set -e` says nothing inside a condition.
+# pip leaves the compilation of modules to their first import, as uv does: most are never imported. The steps are
+# chained because `set -e` says nothing inside a condition.
 install() {
     if command -v uv >/dev/null 2>&1; then
         UV_PYTHON_DOWNLOADS=never
@@ -50,7 +51,7 @@ install() {
             uv pip install --python "$1/bin/python" --no-deps --no-build-isolation --editable "$here"
     else
         "$python" -m venv "$1" &&
-            "$1/bin/python" -m pip install --progress-bar off --require-hashes --only-binary :all: -r "$2" &&
+            "$1/bin/python" -m pip install --no-compile --progress-bar off --only-binary :all: --require-hashes -r "$2" &&
             "$1/bin/python" -m pip install --no-deps --no-build-isolation --no-index --editable "$here"
     fi
 }
@@ -58,7 +59,7 @@ install() {
 # PyTorch is an authority for tests, not a dependency. Its builds differ from machine to machine, so no hash could be
 # locked, and pip is asked, since that finds a build for the processor alone where the machine has one.
 install_torch() {
-    "$1/bin/python" -m pip install --progress-bar off torch==2.13.0
+    "$1/bin/python" -m pip install --no-compile --progress-bar off torch==2.13.0
 }
 
 # What an environment is made of: where any of it has changed, or the checkout has moved, it is made anew.
@@ -107,6 +108,10 @@ test)
     shift
     environment .venv test python3.14 python3.13 python3.12 python3.11 python3
     cd "$here"
+    # All tests run on several processors, each with one thread, since more would only wait for each other.
+    if [ $# -eq 0 ]; then set -- -n auto --maxprocesses 4; fi
+    OMP_NUM_THREADS=${OMP_NUM_THREADS:-1} OPENBLAS_NUM_THREADS=${OPENBLAS_NUM_THREADS:-1}
+    export OMP_NUM_THREADS OPENBLAS_NUM_THREADS
     exec .venv/bin/python -m pytest "$@"
     ;;
 *)
