@@ -6,7 +6,7 @@
 
 Eight steps are taken for a block of rings that stays in the first cache, then used for every channel k. `level` < 0
 marks numbers below the range of a float64; they count as 0 until the recursion has lifted them to level 0. The
-recursion runs in float64, the sums in the dtype of the channels. Steps come in eights, channels in fours.
+recursion runs in float64, the sums in the dtype of the channels. Steps come in eights, channels in pairs.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-BLOCK = 256  # rings: eight steps of them and sixteen channels fit a first cache of 32 KiB in float32
+BLOCK = 128  # rings: eight steps of them and the sums of a few channels fit a first cache of 32 KiB
 EIGHT = 8
 _LIFT = 2.0**-800
 
@@ -68,21 +68,15 @@ def _lift(steps, last, now, level, count):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
 def _accumulate(sums, steps, coefficients, i, count):  # type: ignore[no-untyped-def]
-    for k in range(0, sums.shape[0], 4):
-        w, x, y, z = sums[k], sums[k + 1], sums[k + 2], sums[k + 3]
-        for j in range(0, EIGHT, 4):
-            f = coefficients[i + j : i + j + 4]
-            w0, w1, w2, w3 = f[0, k], f[1, k], f[2, k], f[3, k]
-            x0, x1, x2, x3 = f[0, k + 1], f[1, k + 1], f[2, k + 1], f[3, k + 1]
-            y0, y1, y2, y3 = f[0, k + 2], f[1, k + 2], f[2, k + 2], f[3, k + 2]
-            z0, z1, z2, z3 = f[0, k + 3], f[1, k + 3], f[2, k + 3], f[3, k + 3]
-            p0, p1, p2, p3 = steps[j], steps[j + 1], steps[j + 2], steps[j + 3]
-            for r in range(count):
-                q0, q1, q2, q3 = p0[r], p1[r], p2[r], p3[r]
-                w[r] += w0 * q0 + w1 * q1 + w2 * q2 + w3 * q3
-                x[r] += x0 * q0 + x1 * q1 + x2 * q2 + x3 * q3
-                y[r] += y0 * q0 + y1 * q1 + y2 * q2 + y3 * q3
-                z[r] += z0 * q0 + z1 * q1 + z2 * q2 + z3 * q3
+    p0, p1, p2, p3, p4, p5, p6, p7 = steps[0], steps[1], steps[2], steps[3], steps[4], steps[5], steps[6], steps[7]
+    for k in range(sums.shape[0]):
+        row = sums[k]
+        f0, f1, f2, f3 = coefficients[i, k], coefficients[i + 1, k], coefficients[i + 2, k], coefficients[i + 3, k]
+        f4, f5, f6, f7 = coefficients[i + 4, k], coefficients[i + 5, k], coefficients[i + 6, k], coefficients[i + 7, k]
+        for r in range(count):
+            row[r] += (
+                f0 * p0[r] + f1 * p1[r] + f2 * p2[r] + f3 * p3[r] + f4 * p4[r] + f5 * p5[r] + f6 * p6[r] + f7 * p7[r]
+            )
 
 
 @njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")

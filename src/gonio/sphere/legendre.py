@@ -87,13 +87,13 @@ def folded_recursion(grid: Grid, degree: int) -> Recursion:
 
 @lru_cache(maxsize=8)
 def odd_factors(degree: int, steps: int) -> tuple[np.ndarray, np.ndarray]:
-    """(1 / g_l, g_{l+1}) for l = m, m + 2, ..., each (steps, orders, 1): what turns sums over odd l into even ones.
+    """(1 / g_l, g_{l+1}) for l = m, m + 2, ..., each (steps, orders): what turns sums over odd l into even ones.
 
     cos theta lambda_l = g_l lambda_{l+1} + g_{l-1} lambda_{l-1}, so that the sum over odd l - m of f_l lambda_l is cos
     theta times the sum over even l - m of h_l lambda_l, where g_l h_l = f_{l+1} - g_{l+1} h_{l+2}.
     """
-    m = np.arange(degree + 1)[None, :, None]
-    l = m + 2 * np.arange(steps)[:, None, None]
+    m = np.arange(degree + 1)[None, :]
+    l = m + 2 * np.arange(steps)[:, None]
     return 1 / _coupling(l, m, 0), _coupling(l + 1, m, 0)
 
 

@@ -18,28 +18,40 @@ from functools import lru_cache
 
 import numpy as np
 
-from ..arrays import Array, like, namespace
+from ..arrays import Array, is_numpy, like, namespace
 from .grids import Grid, LatLong
 
 
 def weighted(rings: Array, grid: Grid, degree: int, spin: int, symmetry: int | None = None) -> Array:
     """Rings f (orders, channels, rows) so weighted that their sums against functions to `degree` are integrals.
 
-    With `symmetry` 0 or 1 the rings are the sums (0) or differences (1) of the northern rows and their mirror images;
-    with None they are all rows.
+    With `symmetry` None the rings are all rows; with 0 the sums of the northern rows and their mirror images, with 1
+    the differences, which come out times cos theta. NumPy arrays are changed in place.
     """
+    factors = grid.weights[: rings.shape[2]] * (np.cos(grid.theta[: rings.shape[2]]) if symmetry == 1 else 1)
+    mends = isinstance(grid, LatLong) and 2 * degree >= grid.rows
+    if not mends:
+        return _scaled(rings, factors)
     xp = namespace(rings)
-    product = rings * like(grid.weights[: rings.shape[2]], rings)
-    if not isinstance(grid, LatLong) or 2 * degree < grid.rows:
-        return product
-    parity = [rings[odd::2, ...] for odd in (0, 1)]
     mended = []
-    for odd, part in enumerate(parity):
+    for odd in (0, 1):
         waves, spread = (like(x, rings) for x in _mending(grid, degree, (odd + spin) % 2, symmetry))
-        mended.append((part @ waves.mT) @ spread)
+        mended.append((rings[odd::2, ...] @ waves.mT) @ spread)
+    rings = _scaled(rings, factors)
+    if is_numpy(rings):
+        for odd in (0, 1):
+            rings[odd::2] += mended[odd]
+        return rings
     order = np.arange(rings.shape[0])
-    order = xp.asarray(order // 2 + (order % 2) * parity[0].shape[0], device=rings.device)
-    return product + xp.take(xp.concat(mended, axis=0), order, axis=0)
+    order = xp.asarray(order // 2 + (order % 2) * mended[0].shape[0], device=rings.device)
+    return rings + xp.take(xp.concat(mended, axis=0), order, axis=0)
+
+
+def _scaled(rings: Array, factors: np.ndarray) -> Array:
+    if is_numpy(rings):
+        rings *= like(factors, rings)
+        return rings
+    return rings * like(factors, rings)
 
 
 @lru_cache(maxsize=16)
@@ -60,4 +72,6 @@ def _mending(grid: LatLong, degree: int, odd: int, symmetry: int | None) -> tupl
     spread = (norms[:, None] * (-error if odd else error) * norms[None, :]) @ waves
     if symmetry is not None:
         spread[:, : n // 2] *= 2  # a northern row stands for its mirror image as well
+    if symmetry == 1:
+        spread *= np.cos(theta)
     return waves, spread

@@ -22,7 +22,8 @@ import numpy as np
 
 from ..arrays import Array, floats, is_numpy, like, namespace, require_finite
 from ..errors import ArrayError, ParameterError
-from .azimuth import complex_from_waves, real_from_waves, waves_of_complex, waves_of_real
+from .azimuth import complex_from_waves, waves_of_complex
+from .folding import fold, unfold
 from .grids import Grid
 from .harmonics import degree_of, require_degree
 from .legendre import Recursion, folded_recursion, spin_recursion
@@ -38,12 +39,12 @@ def analysis(values: Array, grid: Grid, degree: int) -> Array:
     """
     _require_carried(degree, grid)
     xp, values = floats(values)
-    waves = waves_of_real(_on_grid(values, grid), degree)
-    even, odd = _folded(waves, grid)
-    rings = xp.permute_dims(xp.concat((xp.real(even), -xp.imag(even), xp.real(odd), -xp.imag(odd)), axis=-1), (1, 2, 0))
+    rings = fold(_on_grid(values, grid), grid, degree)
     half = rings.shape[1] // 2
-    parts = [weighted(rings[:, :half, :], grid, degree, 0, 0), weighted(rings[:, half:, :], grid, degree, 0, 1)]
-    rings = xp.concat((parts[0], parts[1] * _cosines(grid, rings)), axis=1)
+    parts = [
+        weighted(part, grid, degree, 0, symmetry) for symmetry, part in enumerate((rings[:, :half], rings[:, half:]))
+    ]
+    rings = rings if is_numpy(rings) else xp.concat(parts, axis=1)
     return _result(unpack(_projections(folded_recursion(grid, degree), rings), degree), values)
 
 
@@ -53,14 +54,10 @@ def synthesis(coefficients: Array, grid: Grid) -> Array:
     Raises `ArrayError` where the coefficients are no square number, or complex, NaN or infinite; `ParameterError`
     where their degree exceeds `grid.highest_degree`.
     """
-    xp, coefficients = floats(coefficients)
+    _, coefficients = floats(coefficients)
     degree = _carried(coefficients, grid)
     rings = _sums(folded_recursion(grid, degree), pack(_channels(coefficients, 1), degree))
-    cosine, sine, odd_cosine, odd_sine = _quarters(rings)
-    even, odd = cosine - 1j * sine, (odd_cosine - 1j * odd_sine) * _cosines(grid, rings)
-    south = xp.flip((even - odd)[..., : grid.rows // 2], axis=-1)
-    waves = xp.permute_dims(xp.concat((even + odd, south), axis=-1), (2, 0, 1))
-    values = real_from_waves(waves, grid.columns)
+    values = unfold(rings, grid)
     return values if coefficients.ndim == 2 else values[..., 0]
 
 
@@ -96,21 +93,6 @@ def synthesis_spin(coefficients: Array, grid: Grid, spin: int) -> Array:
     back = xp.permute_dims(xp.flip(back_real + 1j * back_imaginary, axis=-1), (2, 0, 1))
     values = complex_from_waves(ahead, back, grid.columns)
     return values if coefficients.ndim == 2 else values[..., 0]
-
-
-def _folded(waves: Array, grid: Grid) -> tuple[Array, Array]:
-    """Sums and differences of the northern rows and their mirror images; the equator is its own and counts once."""
-    xp = namespace(waves)
-    south = xp.flip(waves[grid.rows // 2 :, ...], axis=0)
-    north = waves[: south.shape[0], ...]
-    if grid.rows % 2:
-        south = xp.concat((south[:-1, ...], xp.zeros_like(south[-1:, ...])), axis=0)
-    return north + south, north - south
-
-
-def _cosines(grid: Grid, rings: Array) -> Array:
-    """cos theta of the northern rows."""
-    return like(np.cos(grid.theta[: (grid.rows + 1) // 2]), rings)
 
 
 def _quarters(rings: Array) -> list[Array]:
