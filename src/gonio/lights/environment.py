@@ -71,8 +71,8 @@ class Environment(Light):
         if not bool(xp.all(good)):
             at = tuple(int(k) for k in np.argwhere(~to_numpy(good))[0])
             raise ArrayError(
-                f"Environment: image[{', '.join(map(str, at))}] is {float(to_numpy(image)[at]):.6g}; radiance is finite "
-                "and not negative. Mend the picture, or cut it off with np.clip(image, 0, None) if that is what you mean."
+                f"Environment: image[{', '.join(map(str, at))}] is {float(to_numpy(image)[at]):.6g}; radiance is "
+                "finite and not negative. Mend the picture, or pass np.clip(image, 0, None) if that is meant."
             )
         object.__setattr__(self, "image", frozen(image, image.dtype))
 
@@ -121,7 +121,7 @@ class Environment(Light):
             _, w = floats(w)
             flat = np.ascontiguousarray(w.reshape(-1, 3))
             out = np.empty((len(flat), self.image.shape[-1]), dtype=self.image.dtype)
-            kernels.look_up(self.mapping.kernel, self.mapping.parameter, self._atlas, self.turn, flat, out)
+            kernels.look_up(*self._source, self.turn, flat, out)
             return out.reshape(*w.shape[:-1], -1)
         return self._radiance(w)
 
@@ -135,11 +135,10 @@ class Environment(Light):
         j = xp.clip(xp.astype(x, xp.int64), 0, width)
         i = xp.clip(xp.astype(y, xp.int64), 0, height)
         g, f = (x - xp.astype(j, x.dtype))[..., None], (y - xp.astype(i, y.dtype))[..., None]
-        flat = xp.reshape(self._atlas, (-1, self.image.shape[-1]))
         at = (sheet * (height + 2) + i) * (width + 2) + j
 
         def texel(k: Array) -> Array:
-            return xp.reshape(xp.take(flat, xp.reshape(k, (-1,)), axis=0), (*k.shape, -1))
+            return xp.reshape(xp.take(self._atlas, xp.reshape(k, (-1,)), axis=0), (*k.shape, -1))
 
         top = texel(at) * (1 - g) + texel(at + 1) * g
         bottom = texel(at + width + 2) * (1 - g) + texel(at + width + 3) * g
@@ -147,7 +146,7 @@ class Environment(Light):
 
     @cached_property
     def _atlas(self) -> Array:
-        """Sheets with ghost texels around them, (sheets, h + 2, w + 2, C)."""
+        """Texels of the sheets with ghosts around them, (sheets * (h + 2) * (w + 2), C)."""
         xp = namespace(self.image)
         height, width = self.mapping.sheet_shape(self.rows, self.columns)
 
@@ -163,8 +162,13 @@ class Environment(Light):
         if len(corners):
             meeting = xp.reshape(xp.take(flat, index(corners), axis=0), (len(corners), 3, -1))
             flat = xp.concat((flat, xp.mean(meeting, axis=1)), axis=0)
-        atlas = xp.take(flat, index(self.mapping.ghosts(height, width)), axis=0)
-        return xp.reshape(atlas, (self.mapping.sheets, height + 2, width + 2, -1))
+        return xp.take(flat, index(self.mapping.ghosts(height, width)), axis=0)
+
+    @property
+    def _source(self) -> tuple[Any, ...]:
+        """What the kernels need to look up: the layout's number and parameter, a sheet's height and width, texels."""
+        height, width = self.mapping.sheet_shape(self.rows, self.columns)
+        return self.mapping.kernel, self.mapping.parameter, height, width, to_numpy(self._atlas)
 
     def beams(self, positions: Array | None = None, budget: int | None = None) -> Beams:
         """A beam for each pixel that shows anything, or at most `budget` of them (see `clusters.py`).
@@ -258,24 +262,42 @@ class Environment(Light):
     def resampled(self, mapping: Mapping, rows: int, orientation: Orientation | None = None) -> Environment:
         """The same light in another layout of `rows` rows (and standing as `orientation` says; as now, if None).
 
-        Each new pixel is the mean of the bilinear radiance over its solid angle, from at least two samples for each
-        old pixel's width, so that no lamp falls through; energy is kept to about 1e-3 (bilinear look-ups spread the
-        pixels of a lat-long map's polar rows unevenly).
+        Where the new pixels are the old ones in other places (quarter turns, another order of a cube's faces), they
+        are moved and keep their values. Otherwise each new pixel is the mean of the bilinear radiance over its solid
+        angle, from at least two samples for each old pixel's width, so that no lamp falls through; energy is kept to
+        about 1e-3 (the bilinear look-up spreads a lone bright pixel of a polar row unevenly).
         """
         orientation = self.orientation if orientation is None else orientation
         shape = mapping.shape(rows)
         height, width = mapping.sheet_shape(*shape)
         turn = self.turn.T @ orientation.matrix(mapping)
+        moved = self._moved(mapping, shape, turn)
+        if moved is not None:
+            return Environment(like(moved, self.image), mapping, orientation)
         solid = mapping.sheet_solid_angles(height, width)
         finest = math.sqrt(float(np.max(self.solid_angles)))
         samples = max(math.ceil(2 * math.sqrt(float(solid.max())) / finest - 1e-9), 2)
-        atlas = np.asarray(to_numpy(self._atlas))
-        channels = atlas.shape[-1]
-        sheets = np.empty((mapping.sheets, height, width, channels), dtype=atlas.dtype)
-        kernels.resample(
-            self.mapping.kernel, self.mapping.parameter, atlas, mapping.kernel, mapping.parameter, turn, samples,
-            np.empty(channels), sheets,
-        )  # fmt: skip
-        image = np.zeros((shape[0] * shape[1], channels), dtype=atlas.dtype)
+        channels = self.image.shape[-1]
+        sheets = np.empty((mapping.sheets, height, width, channels), dtype=self._source[-1].dtype)
+        kernels.resample(*self._source, mapping.kernel, mapping.parameter, turn, samples, np.empty(channels), sheets)
+        image = np.zeros((shape[0] * shape[1], channels), dtype=sheets.dtype)
         image[mapping.placement(*shape)] = np.where((solid > 0)[None, ..., None], sheets, 0)
         return Environment(like(image.reshape(*shape, channels), self.image), mapping, orientation)
+
+    def _moved(self, mapping: Mapping, shape: tuple[int, int], turn: np.ndarray) -> np.ndarray | None:
+        """The pixels in their new places, where every new one covers exactly an old one; otherwise None."""
+        solid = mapping.solid_angles(*shape)
+        shown = solid > 0
+        if np.count_nonzero(shown) != np.count_nonzero(self.solid_angles):
+            return None
+        own, _ = mapping.directions(*shape)
+        at = np.stack(self.mapping.pixels(own[shown] @ turn.T, self.rows, self.columns))
+        row, column = np.clip(at.astype(np.int64), 0, [[self.rows - 1], [self.columns - 1]])
+        # Pixels cut by a rim stand for its nearest point, not for their centres.
+        whole = self.solid_angles[row, column] > 0.99 * np.median(self.solid_angles)
+        off = np.abs(at - 0.5 - [row, column])[:, whole | (self.mapping.sheets == 1)]
+        if np.max(off) > 1e-6 or not np.allclose(self.solid_angles[row, column], solid[shown], rtol=1e-6):
+            return None
+        pixels = np.zeros((*shape, self.image.shape[-1]), dtype=np.asarray(to_numpy(self.image)).dtype)
+        pixels[shown] = to_numpy(self.image)[row, column]
+        return pixels
