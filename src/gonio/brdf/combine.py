@@ -14,7 +14,9 @@ import operator
 import sys
 from typing import Any, ClassVar
 
-from ..arrays import Array, floats, like
+import numpy as np
+
+from ..arrays import Array, floats, is_numpy, like
 from ..errors import ParameterError
 from .model import BRDF, Bounds
 
@@ -36,7 +38,15 @@ class Sum(BRDF):
         object.__setattr__(self, "terms", terms)
 
     def evaluate(self, xp: Any, wi: Array, wo: Array) -> Array:
-        return functools.reduce(operator.add, (term.evaluate(xp, wi, wo) for term in self.terms))
+        first, *others = self.terms
+        total = first.evaluate(xp, wi, wo)
+        for term in others:
+            value = term.evaluate(xp, wi, wo)
+            if is_numpy(total) and np.broadcast_shapes(total.shape, value.shape) == total.shape:
+                total += value  # in place: fresh memory costs more than the addition
+            else:
+                total = total + value
+        return total
 
     def _f(self, xp: Any, wi: Array, wo: Array) -> Array:
         return functools.reduce(operator.add, (term._f(xp, wi, wo) for term in self.terms))

@@ -2,8 +2,9 @@
 
     g(w) = integral of (w.h)_+ D(h) d omega_h          (the denominator of MS 5)
 
-g is the distribution blurred by a clamped cosine, hence smooth: a table of 65 x 64 directions, read linearly, is good
-to 1e-3 of g wherever the quadrature over h resolves D.
+g is the distribution blurred by a clamped cosine, hence smooth: a table of 97 x 128 directions, read linearly, is good
+to 4e-4 of g in the mean and 5e-3 towards the horizon, for slopes as narrow as .02. On rings of equal theta the integral
+over azimuth is a circular correlation, done by FFT.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from ..arrays import Array, floats, like, to_numpy
 
 # The table's rows run from the pole to the horizon, both included, and crowd towards the horizon, where g of narrow
 # distributions bends within their width: theta = pi/2 (1 - (1 - r)^2).
-ROWS, COLUMNS = 97, 64
+ROWS, COLUMNS = 97, 128
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -28,21 +29,23 @@ class AreaTable:
     values: np.ndarray
 
     @classmethod
-    def of(cls, D: Callable[[Array], Array], rings: int = 192, spokes: int = 128) -> AreaTable:
-        """The table of the density `D`, by quadrature over `rings` x `spokes` facet normals crowded at the pole."""
+    def of(cls, D: Callable[[Array], Array], rings: int = 192) -> AreaTable:
+        """The table of the density `D` by quadrature over `rings` x COLUMNS facet normals, crowded at the pole."""
         t, weight = np.polynomial.legendre.leggauss(rings)
         # theta = pi/2 ((1 + t) / 2)^3: the finest distributions have their facets within a few degrees of n.
         t = 0.5 * (1 + t)
-        theta, weight = 0.5 * np.pi * t**3, 0.5 * weight * 1.5 * np.pi * t**2 * np.sin(0.5 * np.pi * t**3)
-        phi = 2 * np.pi * (np.arange(spokes) + 0.5) / spokes
-        h = _directions(theta, phi)
-        mass = to_numpy(D(h)).reshape(rings, spokes) * weight[:, None] * (2 * np.pi / spokes)
-        rows = np.linspace(0, 1, ROWS)
-        w = _directions(0.5 * np.pi * (1 - (1 - rows) ** 2), 2 * np.pi * np.arange(COLUMNS) / COLUMNS)
-        values = np.empty(len(w))
-        for k in range(0, len(w), COLUMNS):
-            values[k : k + COLUMNS] = np.maximum(w[k : k + COLUMNS] @ h.T, 0) @ mass.ravel()
-        return cls(values.reshape(ROWS, COLUMNS))
+        theta = 0.5 * np.pi * t**3
+        solid = 0.5 * weight * 1.5 * np.pi * t**2 * np.sin(theta) * (2 * np.pi / COLUMNS)
+        phi = 2 * np.pi * np.arange(COLUMNS) / COLUMNS
+        s = np.sin(theta)[:, None]
+        h = np.stack((s * np.cos(phi), s * np.sin(phi), np.broadcast_to(np.cos(theta)[:, None], (rings, COLUMNS))), -1)
+        mass = np.fft.rfft(to_numpy(D(h)) * solid[:, None])
+        values = np.empty((ROWS, COLUMNS))
+        for k, r in enumerate(np.linspace(0, 1, ROWS)):
+            view = 0.5 * np.pi * (1 - (1 - r) ** 2)
+            facing = np.cos(view) * np.cos(theta)[:, None] + np.sin(view) * s * np.cos(phi)
+            values[k] = np.fft.irfft((np.fft.rfft(np.maximum(facing, 0)) * mass).sum(axis=0), COLUMNS)
+        return cls(values)
 
     def __call__(self, w: Array) -> Array:
         """g (...), at unit local directions `w` (..., 3); below the horizon its value there."""
@@ -60,9 +63,3 @@ class AreaTable:
         r = r + 1
         lower = (1 - y) * table[r * COLUMNS + c] + y * table[r * COLUMNS + beside]
         return (1 - x) * upper + x * lower
-
-
-def _directions(theta: np.ndarray, phi: np.ndarray) -> np.ndarray:
-    theta, phi = np.meshgrid(theta, phi, indexing="ij")
-    s = np.sin(theta)
-    return np.stack((s * np.cos(phi), s * np.sin(phi), np.cos(theta)), axis=-1).reshape(-1, 3)
