@@ -67,11 +67,10 @@ def render(
         out = np.zeros((rows, columns, 3), dtype=np.float32)
     elif out.shape != (rows, columns, 3) or out.dtype != np.float32:
         raise ArrayError(f"out is {out.dtype} {out.shape}; float32 {(rows, columns, 3)} is wanted.")
-    # Distant beams are made once; a near light's at each point. The first ray also builds the ray tracer, once.
-    shape.trace(*camera.rays(np.array([[0.5, 0.5]])))
-    source: Light | Beams = light.beams(budget=samples) if light.distant else light
-    count = source.irradiance.shape[-2] if isinstance(source, Beams) else samples
-    edge = _edge(count * supersample**2)
+    shape.trace(*camera.rays(np.array([[0.5, 0.5]])))  # builds the ray tracer, before threads would each build one
+    sources = _sources(light, samples)
+    beams = sum(s.irradiance.shape[-2] if isinstance(s, Beams) else samples for s in sources)
+    edge = _edge(beams * supersample**2)
 
     def tile(corner: tuple[int, int]) -> int:
         r, c = corner
@@ -81,7 +80,7 @@ def render(
             for part in (some[1], some[0])
         )
         rays = camera.rays(np.stack(np.meshgrid(x, y), axis=-1))
-        colour = _seen(shape, material, light, source, rays, shadows, samples, background)
+        colour = _seen(shape, material, light, sources, rays, shadows, samples, background)
         shown = colour.reshape(len(y) // supersample, supersample, len(x) // supersample, supersample, 3)
         out[some] = shown.mean(axis=(1, 3))
         return (some[0].stop - r) * (some[1].stop - c)
@@ -99,11 +98,20 @@ def render(
     return out
 
 
+def _sources(light: Light, samples: int) -> list[Light | Beams]:
+    """The beams of all distant lights, made once for the whole image, and the near lights, whose beams differ."""
+    parts = light.lights if isinstance(light, Lights) else (light,)
+    near = tuple(part for part in parts if not part.distant)
+    far = tuple(part for part in parts if part.distant)
+    sources: list[Light | Beams] = [Lights(near)] if near else []
+    return [*sources, Lights(far).beams(budget=max(samples - len(near), 1))] if far else sources
+
+
 def _seen(
     shape: Shape,
     material: BRDF,
     light: Light,
-    source: Light | Beams,
+    sources: list[Light | Beams],
     rays: tuple[np.ndarray, np.ndarray],
     shadows: bool,
     samples: int,
@@ -120,16 +128,10 @@ def _seen(
         def arriving(x: np.ndarray, w: np.ndarray, distance: np.ndarray) -> np.ndarray:
             return ~shape.occluded(x, w, distance)
 
-        colour[m] = radiance(
-            material,
-            source,
-            view.frames[m],
-            view.wo[m],
-            view.lifted[m],
-            visibility=arriving if shadows else None,
-            budget=samples,
-            threads=1,
-        )
+        sites = view.frames[m], view.wo[m], view.lifted[m]
+        visibility = arriving if shadows else None
+        for source in sources:
+            colour[m] += radiance(material, source, *sites, visibility=visibility, budget=samples, threads=1)
     return colour
 
 

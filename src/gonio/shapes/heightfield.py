@@ -62,11 +62,13 @@ class HeightField(Shape):
         at = np.arange(z.size).reshape(z.shape)
         nw, ne, sw, se = at[:-1, :-1], at[:-1, 1:], at[1:, :-1], at[1:, 1:]
         faces = np.stack((np.stack((nw, sw, se), axis=-1), np.stack((nw, se, ne), axis=-1)), axis=2)
+        normals = np.pad(self.normals, ((1, 1), (1, 1), (0, 0)), mode="edge").reshape(-1, 3)
         return Mesh(
             vertices=np.stack((x, y, z), axis=-1).reshape(-1, 3),
             faces=faces.reshape(-1, 3),
             uv=np.stack((u, v), axis=-1).reshape(-1, 2),
-            normals=np.pad(self.normals, ((1, 1), (1, 1), (0, 0)), mode="edge").reshape(-1, 3),
+            normals=normals,
+            tangents=np.stack((normals[:, 2], np.zeros(len(normals)), -normals[:, 0]), axis=-1),  # (1, 0, dz/dx)
         )
 
     @property

@@ -1,7 +1,7 @@
 """Triangle meshes with smooth normals and texture coordinates.
 
     normal at a vertex     sum over its faces of angle x face normal (Thuermer and Wuethrich 1998)
-    tangent at a vertex    sum over its faces of angle x (dp/du less its part along the normal)
+    tangent at a vertex    sum over its faces of angle x direction of dp/du, less its part along the normal
     lifted point           P + sum_k b_k max(0, (V_k - P) . n_k) n_k
 
 The lifted point is where shadow rays start: on the smooth surface that the shading normals promise, not on the flat
@@ -20,7 +20,7 @@ import warnings
 import numpy as np
 
 from ..arrays import Array, frozen, require_finite, to_numpy
-from ..directions import dot, normalise
+from ..directions import cross, dot, normalise
 from ..errors import ArrayError, GeometryWarning
 from ..frames import frame
 from .view import Shape, View
@@ -31,8 +31,9 @@ from .visibility import Scene
 class Mesh(Shape):
     """Triangles `faces` (F, 3), counter-clockwise seen from outside, into `vertices` (V, 3).
 
-    `uv` (V, 2) and unit `normals` (V, 3) may be given; without normals they are smooth, also across vertices that
-    share a place (a seam of the texture). Faces without area are left out, with a `GeometryWarning`.
+    `uv` (V, 2), `normals` (V, 3) and `tangents` (V, 3) may be given. Normals are otherwise smooth, also across
+    vertices that share a place (a seam of the texture); tangents otherwise follow growing u, and are zero where uv
+    gives a vertex no direction. Faces without area are left out, with a `GeometryWarning`.
 
     Raises `ArrayError` for indices out of range, values that are not finite, and shapes that do not fit.
     """
@@ -41,6 +42,7 @@ class Mesh(Shape):
     faces: Array
     uv: Array | None = None
     normals: Array | None = None
+    tangents: Array | None = None
 
     def __post_init__(self) -> None:
         vertices = frozen(to_numpy(self.vertices))
@@ -56,7 +58,7 @@ class Mesh(Shape):
                 f"Mesh: faces[{row}] = {faces[row].tolist()} points outside the {len(vertices)} vertices. "
                 "Indices count from 0 (OBJ files count from 1)."
             )
-        for name, width in (("uv", 2), ("normals", 3)):
+        for name, width in (("uv", 2), ("normals", 3), ("tangents", 3)):
             given = getattr(self, name)
             if given is not None:
                 given = frozen(to_numpy(given))
@@ -64,8 +66,8 @@ class Mesh(Shape):
                     raise ArrayError(f"Mesh: {name} has shape {given.shape}, {len(vertices)} vertices want ({width},).")
                 require_finite(given, f"Mesh: {name}")
                 object.__setattr__(self, name, given)
-        area = np.linalg.norm(_twice_area(vertices, faces), axis=-1)
-        flat = area <= 1e-14 * np.ptp(vertices, axis=0).max() ** 2
+        twice_area = np.linalg.norm(_across(vertices[faces]), axis=-1)
+        flat = twice_area <= 1e-14 * np.ptp(vertices, axis=0).max() ** 2
         if flat.any():
             if flat.all():
                 raise ArrayError("Mesh: no face has any area.")
@@ -77,10 +79,17 @@ class Mesh(Shape):
             faces = faces[~flat]
         object.__setattr__(self, "vertices", vertices)
         object.__setattr__(self, "faces", frozen(faces, dtype=np.int64))
+        corners = vertices[self.faces]
+        angles = _angles(corners, twice_area[~flat])
         if self.normals is None:
-            object.__setattr__(self, "normals", frozen(_smooth_normals(vertices, self.faces)))
+            object.__setattr__(self, "normals", frozen(_smooth_normals(vertices, self.faces, angles)))
         else:
             object.__setattr__(self, "normals", frozen(normalise(self.normals, "Mesh: normals")))
+        if self.tangents is None and self.uv is not None:
+            along = angles[..., None] * _unit_or_zero(_along_u(corners, self.uv[self.faces]))[:, None]
+            along = _at_vertices(self.faces, along, len(vertices))
+            along -= dot(along, self.normals)[:, None] * self.normals
+            object.__setattr__(self, "tangents", frozen(_unit_or_zero(along)))
 
     @property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
@@ -92,25 +101,10 @@ class Mesh(Shape):
         """The mesh's ray tracer, built when first asked for."""
         return Scene(self.vertices, self.faces)
 
-    @functools.cached_property
-    def tangents(self) -> np.ndarray | None:
-        """Unit tangents (V, 3) along growing u; None without uv. Zero where uv gives a vertex no direction."""
-        if self.uv is None:
-            return None
-        corners, normals, uv = (to_numpy(x)[self.faces] for x in (self.vertices, self.normals, self.uv))
-        e1, e2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-        d1, d2 = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
-        det = d1[:, 0] * d2[:, 1] - d1[:, 1] * d2[:, 0]
-        along_u = np.sign(det)[:, None] * (d2[:, 1, None] * e1 - d1[:, 1, None] * e2)
-        flat = along_u[:, None] - dot(along_u[:, None], normals)[..., None] * normals
-        total = np.zeros_like(self.vertices)
-        np.add.at(total, self.faces, _angles(self.vertices, self.faces)[..., None] * _unit_or_zero(flat))
-        return _unit_or_zero(total)
-
     def flat(self) -> Mesh:
         """The same mesh with every face its own vertices and its own normal: facets in place of smoothness."""
         corners = self.vertices[self.faces]
-        normal = normalise(_twice_area(self.vertices, self.faces))
+        normal = normalise(_across(corners))
         return Mesh(
             vertices=corners.reshape(-1, 3),
             faces=np.arange(3 * len(corners)).reshape(-1, 3),
@@ -125,7 +119,7 @@ class Mesh(Shape):
         weight = hits.barycentric[mask][..., None]
         corners, normals = self.vertices[corner], to_numpy(self.normals)[corner]
         position = (weight * corners).sum(axis=1)
-        geometric = normalise(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
+        geometric = normalise(_across(corners))
         normal = _unit_or_zero((weight * normals).sum(axis=1))
         normal = np.where(dot(normal, normal)[:, None] > 0, normal, geometric)
         # Faces wound against their given normals lie on the normals' side too.
@@ -152,39 +146,45 @@ class Mesh(Shape):
         anyhow = frame(normal)[:, 0]
         if self.tangents is None:
             return np.asarray(anyhow)
-        tangent = (weight * self.tangents[corner]).sum(axis=1)
+        tangent = (weight * to_numpy(self.tangents)[corner]).sum(axis=1)
         tangent = tangent - dot(tangent, normal)[:, None] * normal
         usable = dot(tangent, tangent)[:, None] > 1e-6
         return np.asarray(np.where(usable, _unit_or_zero(tangent), anyhow))
 
 
-def _twice_area(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
+def _across(corners: np.ndarray) -> np.ndarray:
     """Normals (F, 3) of the faces, as long as twice their area."""
-    a, b, c = (vertices[faces[:, k]] for k in range(3))
-    return np.cross(b - a, c - a)
+    return np.asarray(cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
 
 
-def _angles(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
+def _angles(corners: np.ndarray, twice_area: np.ndarray) -> np.ndarray:
     """The faces' inner angles (F, 3) at their corners."""
-    corners = vertices[faces]
-    angles = np.empty(faces.shape)
-    for k in range(3):
-        e1 = corners[:, (k + 1) % 3] - corners[:, k]
-        e2 = corners[:, (k + 2) % 3] - corners[:, k]
-        # atan2 keeps slivers' digits, where acos of a dot product loses them.
-        angles[:, k] = np.arctan2(np.linalg.norm(np.cross(e1, e2), axis=-1), dot(e1, e2))
-    return angles
+    edges = np.roll(corners, -1, axis=1) - corners  # from each corner to the next
+    # atan2 keeps slivers' digits, where acos of a dot product loses them; |e x e'| is one and the same at each corner.
+    return np.stack([np.arctan2(twice_area, -dot(edges[:, k], edges[:, k - 1])) for k in range(3)], axis=-1)
 
 
-def _smooth_normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
+def _along_u(corners: np.ndarray, uv: np.ndarray) -> np.ndarray:
+    """Vectors (F, 3) in the faces along which u grows and v does not; zero where a face has no area in uv."""
+    e1, e2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    d1, d2 = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
+    sign = np.sign(d1[:, 0] * d2[:, 1] - d1[:, 1] * d2[:, 0])
+    return np.asarray((sign * d2[:, 1])[:, None] * e1 - (sign * d1[:, 1])[:, None] * e2)
+
+
+def _smooth_normals(vertices: np.ndarray, faces: np.ndarray, angles: np.ndarray) -> np.ndarray:
     _, place = np.unique(vertices, axis=0, return_inverse=True)
     place = place.reshape(-1)
-    weighted = _angles(vertices, faces)[..., None] * normalise(_twice_area(vertices, faces))[:, None]
-    total = np.zeros((place.max() + 1, 3))
-    np.add.at(total, place[faces], weighted)
-    normals = _unit_or_zero(total)[place]
+    weighted = angles[..., None] * normalise(_across(vertices[faces]))[:, None]
+    normals = _unit_or_zero(_at_vertices(place[faces], weighted, place.max() + 1))[place]
     # A vertex of no face, or between two faces back to back, has no normal; any one is as good.
     return np.where(dot(normals, normals)[:, None] > 0, normals, (0.0, 0.0, 1.0))
+
+
+def _at_vertices(faces: np.ndarray, values: np.ndarray, count: int) -> np.ndarray:
+    """The sums (V, 3) at the vertices of `values` (F, 3, 3) at the faces' corners."""
+    sums = [np.bincount(faces.ravel(), values[..., k].ravel(), minlength=count) for k in range(3)]
+    return np.stack(sums, axis=-1)
 
 
 def _unit_or_zero(v: np.ndarray) -> np.ndarray:
