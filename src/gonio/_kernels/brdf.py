@@ -122,6 +122,8 @@ def torrance_sparrow(wi, wo, p, steps, out):  # type: ignore[no-untyped-def]
 def dielectric(c, eta):  # type: ignore[no-untyped-def]
     """MS 3 at a cosine in [0, 1]."""
     g = math.sqrt(max(eta * eta - 1 + c * c, 1e-300))
-    s = (g - c) / (g + c)
-    p = (c * (g + c) - 1) / (c * (g - c) + 1)
-    return 0.5 * s * s * (1 + p * p)
+    # Both quotients of MS 3 over one denominator: divisions are what these loops wait for.
+    near, far = g - c, g + c
+    up, down = c * far - 1, c * near + 1
+    quotient = near / (far * down)
+    return 0.5 * quotient * quotient * (down * down + up * up)

@@ -52,16 +52,17 @@ def microfacet(wi, wo, p, steps, out, ndf, shadowing, fresnel):  # type: ignore[
 @njit(cache=True, nogil=True, error_model="numpy")
 def _facets(ndf, x, y, z, l2, ax, ay):  # type: ignore[no-untyped-def]
     """D at (x, y, z) / sqrt(l2)."""
-    x, y = x / ax, y / ay
-    if ndf == GGX:
-        t = (x * x + y * y + z * z) / l2
-        return 1 / (math.pi * ax * ay * t * t)
+    inverse = 1 / (ax * ay)
+    x, y = x * ay * inverse, y * ax * inverse
     z2 = z * z
     e = x * x + y * y
+    if ndf == GGX:
+        t = l2 / (e + z2)
+        return inverse * t * t / math.pi
     if e > 700 * z2:
         return 0.0
-    t = l2 / z2
-    return math.exp(-e / z2) * t * t / (math.pi * ax * ay)
+    t = 1 / z2
+    return math.exp(-e * t) * (l2 * t) ** 2 * inverse / math.pi
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -73,8 +74,9 @@ def _area(ndf, x, y, z, ax, ay):  # type: ignore[no-untyped-def]
         return 0.5 * (z + math.sqrt(s + z * z))
     # g = z + s/2 exp(-a^2) w(a), a = z/s: one exponential instead of two and an error function.
     s = max(math.sqrt(s), 1e-150)
-    a = z / s
-    return z + 0.5 * s * _hidden(1 / (1 + 0.5 * a)) * math.exp(-a * a)
+    r = 1 / (s * (s + 0.5 * z))
+    a = z * (s + 0.5 * z) * r
+    return z + 0.5 * s * _hidden(s * s * r) * math.exp(-a * a)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
@@ -106,6 +108,6 @@ def _reflected(fresnel, c, first, second):  # type: ignore[no-untyped-def]
     t = first * first - second * second - s2
     m = math.sqrt(t * t + 4 * first * first * second * second)
     ac = math.sqrt(max(0.5 * (m + t), 0.0)) * c
-    s = (m + c2 - 2 * ac) / max(m + c2 + 2 * ac, 1e-300)
-    top = c2 * m + s2 * s2
-    return 0.5 * s * (1 + (top - 2 * ac * s2) / max(top + 2 * ac * s2, 1e-300))
+    s_part, top = m + c2, c2 * m + s2 * s2
+    low = max((s_part + 2 * ac) * (top + 2 * ac * s2), 1e-300)
+    return (s_part - 2 * ac) * top / low
