@@ -1,11 +1,13 @@
 """Both ray tracers meet what brute force meets, at any scale and from any distance."""
 
+import sys
+
 import numpy as np
 import pytest
 from reference import rays
 
 import gonio as gn
-from gonio.shapes.visibility import Embree, Hierarchy
+from gonio.shapes.visibility import Embree, Hierarchy, default_tracer
 
 
 def soup(rng, faces=300, size=0.4):
@@ -107,6 +109,11 @@ def test_the_tracers_agree(rng):
     assert np.mean(a.intersect(origins, directions).face == b.intersect(origins, directions).face) > 0.999
     far = rng.uniform(0, 2, 3000)
     assert np.mean(a.occluded(origins, directions, far) == b.occluded(origins, directions, far)) > 0.999
+
+
+def test_where_embree_has_no_wheel_our_own_hierarchy_stands_in(monkeypatch):
+    monkeypatch.setitem(sys.modules, "embreex", None)
+    assert default_tracer() is Hierarchy
 
 
 def test_visibility_is_what_single_rays_say(rng):
