@@ -1,3 +1,4 @@
+__version__: str
 from .brdf.albedo import albedo as albedo
 from .brdf.diffuse import Lambert as Lambert
 from .brdf.diffuse import OrenNayar as OrenNayar
@@ -9,12 +10,14 @@ from .brdf.lafortune import Lafortune as Lafortune
 from .brdf.microfacet import Microfacet as Microfacet
 from .brdf.ndf import GGX as GGX
 from .brdf.ndf import Beckmann as Beckmann
+from .brdf.ndf_table import TabulatedNDF as TabulatedNDF
 from .brdf.phong import BlinnPhong as BlinnPhong
 from .brdf.phong import ModifiedPhong as ModifiedPhong
 from .brdf.phong import Phong as Phong
 from .brdf.shadowing import Ashikhmin as Ashikhmin
 from .brdf.shadowing import Smith as Smith
 from .brdf.shadowing import VGroove as VGroove
+from .brdf.table import HalfDifferenceTable as HalfDifferenceTable
 from .brdf.torrance_sparrow import TorranceSparrow as TorranceSparrow
 from .brdf.ward import Ward as Ward
 from .cameras import Orthographic as Orthographic
@@ -23,6 +26,8 @@ from .cameras import look_at as look_at
 from .directions import normalise as normalise
 from .errors import GonioError as GonioError
 from .errors import GonioWarning as GonioWarning
+from .files.brdfs import read_brdf as read_brdf
+from .files.cornell import read_cornell as read_cornell
 from .files.environments import read_environment as read_environment
 from .files.environments import write_environment as write_environment
 from .files.images import image_info as image_info
@@ -30,6 +35,10 @@ from .files.images import read_image as read_image
 from .files.images import read_layers as read_layers
 from .files.images import write_image as write_image
 from .files.images import write_layers as write_layers
+from .files.merl import read_merl as read_merl
+from .files.merl import write_merl as write_merl
+from .files.meshes import read_mesh as read_mesh
+from .files.rgl import read_rgl as read_rgl
 from .frames import frame as frame
 from .lights.cubes import CubeCross as CubeCross
 from .lights.cubes import CubeStrip as CubeStrip
@@ -66,6 +75,3 @@ from .sphere.transform import synthesis as synthesis
 from .sphere.transform import synthesis_spin as synthesis_spin
 from .sphere.wigner import wigner_D as wigner_D
 from .sphere.wigner import wigner_d as wigner_d
-
-__version__: str
-from .files.meshes import read_mesh as read_mesh

@@ -89,8 +89,8 @@ def test_ggx_survives_tabulation(rng):
     table = HalfDifferenceTable.of(model)
     wi, wo = directions(rng, 20000, 0.3), directions(rng, 20000, 0.3)
     f = model.f(wi, wo)
-    # alpha = .3 bends within some 17 degrees, as the Blinn lobe above does.
-    assert np.abs(table.f(wi, wo)[..., :1] / f - 1).max() < 0.02
+    # alpha = .3 bends within some 17 degrees, as the Blinn lobe above does; measured .3 %.
+    assert np.abs(table.f(wi, wo)[..., :1] / f - 1).max() < 0.006
 
 
 def test_nothing_is_reflected_below_the_surface(noise):

@@ -31,7 +31,7 @@ _BLOCK = 16384  # pairs at once: some 40 MB of neighbours
 class ScatteredBRDF(BRDF):
     """`values` (n, C) >= 0 in 1/sr measured at local unit directions `wi`, `wo` (n, 3) above the surface; n >= 16.
 
-    About 20 us a pair: tabulate it with `HalfDifferenceTable.of` where many are asked for.
+    Some 10 us a pair: tabulate it with `HalfDifferenceTable.of` where many are asked for.
     Raises `ArrayError` or `DirectionError` where shapes, values or directions do not fit.
     """
 
