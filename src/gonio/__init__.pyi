@@ -1,4 +1,3 @@
-__version__: str
 from .brdf.albedo import albedo as albedo
 from .brdf.diffuse import Lambert as Lambert
 from .brdf.diffuse import OrenNayar as OrenNayar
@@ -75,3 +74,5 @@ from .sphere.transform import synthesis as synthesis
 from .sphere.transform import synthesis_spin as synthesis_spin
 from .sphere.wigner import wigner_D as wigner_D
 from .sphere.wigner import wigner_d as wigner_d
+
+__version__: str
