@@ -76,7 +76,7 @@ def radiance(
     if positions is None and (not distant or callable(visibility)):
         raise ArrayError("positions are needed: the light is near, or visibility is traced from them.")
     if count == 0:
-        return xp.zeros((*sites, 3), dtype=wo.dtype)
+        return xp.reshape(xp.zeros_like(wo), (*sites, 3))
 
     beams = _beams(light, positions, budget, wo)
     rays = int(beams(slice(0, 1)).directions.shape[-2])
@@ -154,7 +154,7 @@ def _block(
     else:
         directions, irradiance = xp.permute_dims(directions, (1, 0, 2)), xp.permute_dims(irradiance, (1, 0, 2))
         distance = xp.permute_dims(distance, (1, 0))
-    total = xp.zeros((sites, 1), dtype=wo.dtype) + xp.zeros_like(wo[..., :1])
+    total = xp.zeros_like(wo[..., :1])
     step = max(1, PAIRS // sites)
     for start in range(0, directions.shape[0], step):
         some = slice(start, start + step)
