@@ -16,7 +16,7 @@ def decode_radiance(data, out):  # type: ignore[no-untyped-def]
             8 <= length <= 32767 and at + 4 <= len(data) and data[at] == 2 and data[at + 1] == 2 and data[at + 2] < 128
         )
         if new:
-            if data[at + 2] * 256 + data[at + 3] != length:
+            if int(data[at + 2]) * 256 + int(data[at + 3]) != length:
                 return -1
             at += 4
             for channel in range(4):

@@ -10,6 +10,7 @@ Not here: XYZE pictures.
 
 from __future__ import annotations
 
+import functools
 import re
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -70,13 +71,12 @@ def write(path: Path, image: np.ndarray) -> None:
 
     Each channel is right to 1/256 of the pixel's largest one; what is below 2^-128 becomes black.
     """
-    colour = np.broadcast_to(image, (*image.shape[:2], 3)).astype(np.float64)
-    largest = colour.max(axis=-1)
+    largest = functools.reduce(np.maximum, np.moveaxis(image, -1, 0))  # quicker than image.max(axis=-1)
     exponent = np.frexp(largest)[1]
     # A mantissa of 255.5 and more rounds to 256, which takes the next exponent.
     exponent += np.rint(np.ldexp(largest, 8 - exponent)) > 255
-    rgbe = np.empty((*colour.shape[:2], 4), np.uint8)
-    rgbe[..., :3] = np.rint(np.ldexp(colour, (8 - exponent)[..., None]))
+    rgbe = np.empty((*largest.shape, 4), np.uint8)
+    rgbe[..., :3] = np.rint(np.ldexp(image, (8 - exponent)[..., None]))
     rgbe[..., 3] = exponent + 128
     rgbe[(exponent < -127) | (largest == 0)] = 0
     rows, columns = largest.shape

@@ -99,8 +99,11 @@ def by_opencv(
     pixels = pixels.reshape(*pixels.shape[:2], -1)
     if pixels.shape[:2] != (rows, columns):
         raise FileError(f"{path}: the header says {rows} x {columns} pixels, {pixels.shape[:2]} were decoded.")
-    alpha = pixels[..., 3] if pixels.shape[2] == 4 else None
-    return np.ascontiguousarray(pixels[..., 2::-1] if pixels.shape[2] > 1 else pixels), alpha
+    if pixels.shape[2] == 1:
+        return pixels, None
+    if pixels.shape[2] == 3:
+        return cv2.cvtColor(pixels, cv2.COLOR_BGR2RGB), None
+    return cv2.cvtColor(pixels, cv2.COLOR_BGRA2RGB), pixels[..., 3]
 
 
 def opaque(alpha: np.ndarray) -> bool:
