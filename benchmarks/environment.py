@@ -58,7 +58,7 @@ def budgets(room: gn.Environment) -> None:
         out = []
         for power in (1, 10, 100):
 
-            def lit(d: np.ndarray, e: np.ndarray) -> np.ndarray:
+            def lit(d: np.ndarray, e: np.ndarray, power: int = power) -> np.ndarray:
                 total: np.ndarray = np.maximum(normals @ d.T, 0) ** power @ e
                 return total
 

@@ -2,11 +2,11 @@ import math
 
 import numpy as np
 import pytest
+from reference import environment as reference
 
 import gonio as gn
 from gonio.errors import ArrayError, DirectionError, ParameterError
 from gonio.frames import euler
-from reference import environment as reference
 
 O = gn.Orientation
 LAYOUTS = [

@@ -173,7 +173,7 @@ def look_up(layout, parameter, height, width, texels, turn, w, out):  # type: ig
 def resample(  # type: ignore[no-untyped-def]
     layout, parameter, height, width, texels, to_layout, to_parameter, turn, samples, total, out
 ):
-    """`out` (sheets, h, w, C) = mean radiance of `texels` (see `look_up`) over the solid angle of each texel of another layout.
+    """`out` (sheets, h, w, C) = mean of `texels` (see `look_up`) over the solid angle of another layout's texels.
 
     `samples` x `samples` bilinear look-ups a texel, weighted by solid angle; `turn` takes the target's own axes to
     the source's. `total` (C,) is scratch.

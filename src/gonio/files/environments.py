@@ -142,11 +142,15 @@ def _faces(paths: list[Path]) -> list[Path]:
     """Six files in the order of `FACES`, known by the ends of their names."""
     found: dict[str, Path] = {}
     for path in paths:
-        named = [face for face, ends in _FACE_NAMES.items() if path.stem.lower().endswith(ends)]
-        if len(named) != 1 or named[0] in found:
+        stem = path.stem.lower()
+        # The longest ending: "left" ends in "ft" as well.
+        named = max(
+            ((len(e), face) for face, ends in _FACE_NAMES.items() for e in ends if stem.endswith(e)), default=None
+        )
+        if named is None or named[1] in found:
             raise FileError(
                 f"{path}: which face is it? The names of six files end in px nx py ny pz nz, or {' '.join(FACES)}, "
                 "each once."
             )
-        found[named[0]] = path
+        found[named[1]] = path
     return [found[face] for face in FACES]

@@ -64,7 +64,9 @@ class Environment(Light):
                 "columns, C) with C = 1 or 3. Drop an alpha channel with image[..., :3]."
             )
         self.orientation.matrix(self.mapping)
-        shown = self.mapping.solid_angles(*image.shape[:2]) > 0
+        solid = frozen(self.mapping.solid_angles(*image.shape[:2]))
+        self.__dict__["solid_angles"] = solid  # the cached property's own place
+        shown = solid > 0
         if not shown.all():
             image = xp.where(like(shown, image)[..., None] > 0, image, xp.zeros_like(image))
         good = xp.isfinite(image) & (image >= 0)
