@@ -63,10 +63,9 @@ def test_complex_harmonics_agree_with_scipy_to_degree_1000(directions):
     some = np.random.default_rng(5).choice(l.size, 3000, replace=False)
     theta, phi = np.arctan2(np.hypot(w[:, 0], w[:, 1]), w[:, 2]), np.arctan2(w[:, 1], w[:, 0])
     expected = special.sph_harm_y(l[some], m[some], theta[:, None], phi[:, None])
-    # SciPy starts each order from sin^m and is lost, or NaN, where that underflows.
-    start = np.abs(m[some]) * np.log10(np.sin(theta[:, None]))
-    known = np.isfinite(expected) & (start > -100)
-    assert np.mean(known) > 0.3
+    # SciPy is lost or NaN where its unnormalised functions leave the range of a float.
+    known = np.isfinite(expected) & (np.abs(m[some]) < 700) & (theta[:, None] > 0.1)
+    assert np.mean(known) > 0.2
     # Roundings of theta grow by l^2 near the poles: 1e-16 to 1e-10.
     close(gn.complex_harmonics(1000, w)[:, some][known], expected[known], atol=1e-9)
 

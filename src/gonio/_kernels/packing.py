@@ -13,44 +13,43 @@ _TILE = 16  # orders: the cache lines that a tile writes, for a few channels, st
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def fold(waves, turn, rings):  # type: ignore[no-untyped-def]
-    """rings[m, (even re, even -im, odd re, odd -im) c, r] from waves (rows, orders or more, C), turned by turn[m].
+def fold(north, south, turn, low, rings):  # type: ignore[no-untyped-def]
+    """rings[m, (even re, even -im, odd re, odd -im) c, r] for the rows r = low, low + 1, ... of `north`.
 
-    Even is the sum of row r and its mirror image, odd the difference. The equator is its own image and counts once.
+    north, south: (some rows, orders or more, C), a row and its mirror image; even is their sum, odd the difference,
+    both turned by turn[m].
     """
-    rows, channels = waves.shape[0], waves.shape[2]
+    rows, _, channels = north.shape
     for tile in range(0, turn.size, _TILE):
         stop = min(tile + _TILE, turn.size)
-        for r in range((rows + 1) // 2):
-            mirror = rows - 1 - r
+        for r in range(rows):
             for m in range(tile, stop):
                 for c in range(channels):
-                    north = waves[r, m, c] * turn[m]
-                    south = waves[mirror, m, c] * turn[m] if mirror > r else 0 * north
-                    even, odd = north + south, north - south
-                    rings[m, c, r] = even.real
-                    rings[m, channels + c, r] = -even.imag
-                    rings[m, 2 * channels + c, r] = odd.real
-                    rings[m, 3 * channels + c, r] = -odd.imag
+                    even = (north[r, m, c] + south[r, m, c]) * turn[m]
+                    odd = (north[r, m, c] - south[r, m, c]) * turn[m]
+                    rings[m, c, low + r] = even.real
+                    rings[m, channels + c, low + r] = -even.imag
+                    rings[m, 2 * channels + c, low + r] = odd.real
+                    rings[m, 3 * channels + c, low + r] = -odd.imag
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def unfold(rings, turn, cosines, waves):  # type: ignore[no-untyped-def]
-    """waves (rows, orders or more, C) from rings[m, (even cos, even sin, odd cos, odd sin) c, r]: cos - i sin, turned.
+def unfold(rings, turn, cosines, low, north, south):  # type: ignore[no-untyped-def]
+    """north, south (some rows, orders or more, C) from rings[m, (even cos, even sin, odd cos, odd sin) c, low + r].
 
-    Odd parts are multiplied by cosines[r]. Orders beyond those of `turn` become 0.
+    cos - i sin, turned by turn[m]; the odd parts are multiplied by cosines[low + r]. Further orders are left alone.
     """
-    rows, channels = waves.shape[0], waves.shape[2]
-    waves[:, turn.size :] = 0
+    rows, _, channels = north.shape
     for tile in range(0, turn.size, _TILE):
         stop = min(tile + _TILE, turn.size)
-        for r in range((rows + 1) // 2):
+        for r in range(rows):
+            at = low + r
             for m in range(tile, stop):
                 for c in range(channels):
-                    even = complex(rings[m, c, r], -rings[m, channels + c, r]) * turn[m]
-                    odd = complex(rings[m, 2 * channels + c, r], -rings[m, 3 * channels + c, r]) * turn[m] * cosines[r]
-                    waves[rows - 1 - r, m, c] = even - odd
-                    waves[r, m, c] = even + odd
+                    even = complex(rings[m, c, at], -rings[m, channels + c, at]) * turn[m]
+                    odd = complex(rings[m, 2 * channels + c, at], -rings[m, 3 * channels + c, at]) * turn[m]
+                    north[r, m, c] = even + odd * cosines[at]
+                    south[r, m, c] = even - odd * cosines[at]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -19,7 +19,7 @@ from ..arrays import Array, is_numpy, like, namespace
 
 def waves_of_real(values: Array, degree: int) -> Array:
     """waves_m of real values."""
-    waves = fft_of(values).rfft(values, axis=1)[:, : degree + 1, :]
+    waves = _fft(values).rfft(values, axis=1)[:, : degree + 1, :]
     return waves * _turns(degree, values.shape[1], waves, -1)
 
 
@@ -28,13 +28,13 @@ def real_from_waves(waves: Array, columns: int) -> Array:
     degree = waves.shape[1] - 1
     # irfft counts every m > 0 twice.
     turns = _turns(degree, columns, waves, 1) * _halves(degree, waves)
-    return fft_of(waves).irfft(waves * turns, n=columns, axis=1, norm="forward")
+    return _fft(waves).irfft(waves * turns, n=columns, axis=1, norm="forward")
 
 
 def waves_of_complex(values: Array, degree: int) -> tuple[Array, Array]:
     """(waves_m, waves_{-m}) of complex values; m = 0 stands in both."""
     xp = namespace(values)
-    waves = fft_of(values).fft(values, axis=1)
+    waves = _fft(values).fft(values, axis=1)
     turns = _turns(degree, values.shape[1], waves, -1)
     back = xp.concat((waves[:, :1, :], xp.flip(waves[:, values.shape[1] - degree :, :], axis=1)), axis=1)
     return waves[:, : degree + 1, :] * turns, back * xp.conj(turns)
@@ -48,10 +48,10 @@ def complex_from_waves(ahead: Array, back: Array, columns: int) -> Array:
     back = xp.flip((back * xp.conj(turns))[:, 1:, :], axis=1)
     shape = (ahead.shape[0], columns - 2 * degree - 1, ahead.shape[2])
     gap = xp.zeros(shape, dtype=ahead.dtype, device=ahead.device)
-    return fft_of(ahead).ifft(xp.concat((ahead * turns, gap, back), axis=1), axis=1, norm="forward")
+    return _fft(ahead).ifft(xp.concat((ahead * turns, gap, back), axis=1), axis=1, norm="forward")
 
 
-def fft_of(x: Array) -> Any:
+def _fft(x: Array) -> Any:
     """SciPy's transforms for NumPy arrays, since they are vectorised in float32 too; the library's own for others."""
     if is_numpy(x):
         import scipy.fft

@@ -22,6 +22,7 @@ import numpy as np
 
 from ..arrays import Array, floats, is_numpy, like, namespace, require_finite
 from ..errors import ArrayError, ParameterError
+from . import low_degree
 from .azimuth import complex_from_waves, waves_of_complex
 from .folding import fold, unfold
 from .grids import Grid
@@ -39,7 +40,10 @@ def analysis(values: Array, grid: Grid, degree: int) -> Array:
     """
     _require_carried(degree, grid)
     xp, values = floats(values)
-    rings = fold(_on_grid(values, grid), grid, degree)
+    rows = _on_grid(values, grid)
+    if _is_low(values, grid, degree):
+        return _result(low_degree.analyse(rows, grid, degree), values)
+    rings = fold(rows, grid, degree)
     half = rings.shape[1] // 2
     parts = [
         weighted(part, grid, degree, 0, symmetry) for symmetry, part in enumerate((rings[:, :half], rings[:, half:]))
@@ -56,8 +60,11 @@ def synthesis(coefficients: Array, grid: Grid) -> Array:
     """
     _, coefficients = floats(coefficients)
     degree = _carried(coefficients, grid)
-    rings = _sums(folded_recursion(grid, degree), pack(_channels(coefficients, 1), degree))
-    values = unfold(rings, grid)
+    flat = _channels(coefficients, 1)
+    if _is_low(flat, grid, degree):
+        values = low_degree.synthesise(flat, grid, degree)
+    else:
+        values = unfold(_sums(folded_recursion(grid, degree), pack(flat, degree)), grid)
     return values if coefficients.ndim == 2 else values[..., 0]
 
 
@@ -93,6 +100,11 @@ def synthesis_spin(coefficients: Array, grid: Grid, spin: int) -> Array:
     back = xp.permute_dims(xp.flip(back_real + 1j * back_imaginary, axis=-1), (2, 0, 1))
     values = complex_from_waves(ahead, back, grid.columns)
     return values if coefficients.ndim == 2 else values[..., 0]
+
+
+def _is_low(x: Array, grid: Grid, degree: int) -> bool:
+    """Whether one pass over the image is the faster way, and exact."""
+    return is_numpy(x) and degree <= low_degree.HIGHEST and grid.columns % 2 == 0 and 2 * degree < grid.rows
 
 
 def _quarters(rings: Array) -> list[Array]:
