@@ -6,8 +6,9 @@ import pytest
 from reference import wigner as reference
 
 import gonio as gn
+from gonio._kernels import wigner as kernel
 from gonio.errors import ArrayError, DirectionError, ParameterError
-from gonio.frames import euler, rotation_y, rotation_z
+from gonio.frames import euler, euler_angles, rotation_y, rotation_z
 
 compiled = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="takes minutes where loops are not compiled")
 
@@ -103,6 +104,16 @@ def test_gradients_reach_coefficients_and_rotation(rng):
     assert bool(torch.all(torch.isfinite(R.grad))) and float(torch.abs(R.grad).max()) > 0
 
 
+@pytest.mark.parametrize("alpha", [0.0, 1e-9, 0.4, math.pi / 2, math.pi])
+def test_the_kernel_finds_the_angles_of_rh_2_10(alpha):
+    R = euler(alpha, -2.0, 0.7)
+    *found, error = kernel.angles(R)
+    np.testing.assert_allclose(euler(*found), R, rtol=0, atol=1e-8)
+    np.testing.assert_allclose(found, [float(a) for a in euler_angles(R)], rtol=0, atol=1e-12)
+    assert error < 1e-28
+    assert kernel.angles(np.diag([1.0, 1, -1]))[-1] > 1
+
+
 def test_single_precision_is_kept(rng):
     coefficients = rng.normal(size=(9, 3)).astype(np.float32)
     assert gn.rotate(coefficients, np.eye(3)).dtype == np.float32
@@ -117,6 +128,10 @@ def test_bad_input_is_refused(rng):
         gn.rotate(np.zeros(9, dtype=complex), np.eye(3))
     with pytest.raises(DirectionError, match="mirrors"):
         gn.rotate(np.zeros(9), np.diag([1.0, 1, -1]))
+    with pytest.raises(DirectionError, match="shape"):
+        gn.rotate(np.zeros(9), np.zeros((2, 3, 3)))
+    with pytest.raises(DirectionError, match="orthonormal"):
+        gn.rotate(np.zeros(9), np.full((3, 3), np.nan))
     with pytest.raises(DirectionError, match="orthonormal"):
         gn.rotate(np.zeros(9), 2 * np.eye(3))
     with pytest.raises(ParameterError, match="1500"):

@@ -20,7 +20,7 @@ SCALE = 2.0**900
 _FAST = {"reassoc", "contract", "nsz"}
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _halves(alpha):
     """cos(alpha/2), sin(alpha/2), and `side`, `near` with cos alpha = side (1 - near): no digits cancel at 0 and pi."""
     cos_half, sin_half = math.cos(alpha / 2), math.sin(alpha / 2)
@@ -29,7 +29,7 @@ def _halves(alpha):
     return cos_half, sin_half, -1.0, 2 * cos_half * cos_half
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _tables(degree):
     """What the rows of one degree share, k = -degree..degree: k, S_l(k), S_(l-1)(k) / S_l(k), 1 / S_l(k); sqrt(n)."""
     n = 2 * degree + 1
@@ -37,7 +37,7 @@ def _tables(degree):
     return orders, np.zeros(n), np.zeros(n), np.zeros(n), np.sqrt(np.arange(n + 1.0))
 
 
-@njit(cache=True, nogil=True, fastmath=_FAST)
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=_FAST)
 def _to_degree(l, orders, s, ratio, inverse):
     """Brings the tables from degree l - 1 to l, for abs(k) < l."""
     inner = slice(len(orders) // 2 - l + 1, len(orders) // 2 + l)
@@ -49,7 +49,7 @@ def _to_degree(l, orders, s, ratio, inverse):
         s[j] = root
 
 
-@njit(cache=True, nogil=True, fastmath=_FAST)
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=_FAST)
 def _start(l, cos_half, sin_half, roots, row):
     """Row m = l: by ratios from the largest entry outwards, then brought to length SCALE."""
     peak = round(l * (cos_half - sin_half) * (cos_half + sin_half)) + l
@@ -69,7 +69,7 @@ def _start(l, cos_half, sin_half, roots, row):
         row[j] = -row[j]
 
 
-@njit(cache=True, nogil=True, fastmath=_FAST)
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=_FAST)
 def _advance(l, m, side, near, orders, s, ratio, inverse, row, before):
     """Row m < l of degree l, written over degree l - 2 in `row`, from degree l - 1 in `before`."""
     centre = len(orders) // 2
@@ -85,7 +85,7 @@ def _advance(l, m, side, near, orders, s, ratio, inverse, row, before):
         row[j] = inverse[j] * (slope * (whole - order * orders[j]) - near) * before[j] - b * ratio[j] * row[j]
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def matrices(degree, lowest, alpha, out):
     """d^l(alpha) for l = lowest..degree, each (2l+1, 2l+1), row after row and one after the other in `out` (flat)."""
     cos_half, sin_half, side, near = _halves(alpha)
@@ -116,7 +116,27 @@ def matrices(degree, lowest, alpha, out):
                 d[l - m, l + k] = d[l - k, l + m] = sign * across
 
 
-@njit(cache=True, nogil=True, fastmath=_FAST)
+@njit(cache=True, nogil=True, error_model="numpy")
+def angles(R):
+    """(alpha, beta, gamma, error): `frames.euler_angles` of one matrix (3, 3), and the squared distance from a rotation."""
+    error = 0.0
+    for i in range(3):
+        for j in range(i + 1):
+            product = R[i, 0] * R[j, 0] + R[i, 1] * R[j, 1] + R[i, 2] * R[j, 2]
+            error += (product - (1.0 if i == j else 0.0)) ** 2
+        # Each row is the cross product of the two after it; a mirror has the opposite.
+        j, k = (i + 1) % 3, (i + 2) % 3
+        for m in range(3):
+            n, o = (m + 1) % 3, (m + 2) % 3
+            error += (R[j, n] * R[k, o] - R[j, o] * R[k, n] - R[i, m]) ** 2
+    sine = math.hypot(R[0, 2], R[1, 2])
+    alpha = math.atan2(sine, R[2, 2])
+    if sine > 1e-7:
+        return alpha, math.atan2(R[1, 2], R[0, 2]), math.atan2(R[2, 1], -R[2, 0]), error
+    return alpha, 0.0, math.atan2(R[1, 0], R[1, 1]), error
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=_FAST)
 def rotate(coefficients, alpha, beta, gamma, out):
     """Real coefficients ((degree+1)^2, C) of f turned by R_z(beta) R_y(alpha) R_z(gamma), written to `out`.
 

@@ -13,8 +13,8 @@ import numpy as np
 
 from .._kernels import wigner as kernel
 from ..arrays import Array, floats, is_numpy, like, to_numpy
-from ..errors import ArrayError
-from ..frames import euler_angles
+from ..errors import ArrayError, DirectionError
+from ..frames import euler_angles, require_rotation
 from .harmonics import complex_from_real, degree_of, real_from_complex
 from .wigner import quarter_turns, require_degree_of_d
 
@@ -34,10 +34,15 @@ def rotate(coefficients: Array, rotation: Array) -> Array:
     precise = xp.astype(coefficients, xp.float64)
     if not is_numpy(coefficients):
         return xp.astype(_by_quarter_turns(precise, degree, like(rotation, precise)), coefficients.dtype)
-    alpha, beta, gamma = euler_angles(to_numpy(rotation))
+    R = np.ascontiguousarray(to_numpy(rotation), dtype=np.float64)
+    if R.shape != (3, 3):
+        raise DirectionError(f"rotation has shape {R.shape}; one is needed: (3, 3).")
+    alpha, beta, gamma, error = kernel.angles(R)
+    if not error < 1e-10:  # so written that NaN fails too
+        require_rotation(R, "rotation")
     columns = np.ascontiguousarray(precise).reshape(len(precise), -1)
     turned = np.empty_like(columns)
-    kernel.rotate(columns, float(alpha), float(beta), float(gamma), turned)
+    kernel.rotate(columns, alpha, beta, gamma, turned)
     return turned.reshape(coefficients.shape).astype(coefficients.dtype, copy=False)
 
 
