@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import math
 
+import numba
 import numpy as np
 import pytest
 
 import gonio as gn
+
+pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="takes minutes where loops are not compiled")
 
 ANGLES = np.radians([0, 30, 60, 75, 85])
 VIEWS = np.stack((np.sin(ANGLES), np.zeros(5), np.cos(ANGLES)), axis=-1)

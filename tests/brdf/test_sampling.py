@@ -48,8 +48,8 @@ def probabilities(model, wo):
 @pytest.mark.parametrize("name", SAMPLERS)
 def test_samples_fall_as_their_density_says(name):
     model, n = SAMPLERS[name], 50_000
-    # An oblique and a steep view; in the second many facets are seen edge-on, or from behind.
-    for wo in (WO, np.array([0.0, -0.96, 0.28])):
+    # An oblique, a steep and a grazing view; in the last two many facets are seen edge-on, or from behind.
+    for wo in (WO, np.array([0.0, -0.96, 0.28]), np.array([np.sqrt(1 - 0.05**2), 0.0, 0.05])):
         wi = model.sample(wo, np.random.default_rng(5).random((n, 3)))
         np.testing.assert_allclose((wi**2).sum(-1), 1, rtol=1e-12)
         expected, rest, away = probabilities(model, wo)
