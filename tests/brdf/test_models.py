@@ -176,6 +176,9 @@ def test_fibres_throw_a_cone():
         lambda: gn.Lafortune(cz=2.0, n=100.0),
         lambda: -0.1 * gn.Lambert(0.5),
         lambda: gn.Lambert([0.5, 0.5]),
+        lambda: gn.Microfacet(0.3),
+        lambda: gn.Microfacet(gn.GGX(0.3), 1.5),
+        lambda: gn.Microfacet(gn.GGX(0.3), gn.Fresnel(1.5), "smith"),
     ],
 )
 def test_parameters_out_of_range_are_refused(make):

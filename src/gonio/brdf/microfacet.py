@@ -14,6 +14,7 @@ from typing import Any
 from .._kernels import microfacet as kernels
 from ..arrays import Array, floats, to_numpy
 from ..directions import dot, half_vector
+from ..errors import ParameterError
 from .fresnel import Conductor, Fresnel, Reflectance, Schlick
 from .model import BRDF
 from .ndf import GGX, NDF, Beckmann, Slopes
@@ -28,12 +29,7 @@ REFLECTANCES: dict[type, int] = {
     Conductor: kernels.CONDUCTOR,
     Schlick: kernels.SCHLICK,
 }
-SHADOWINGS: dict[Shadowing, int] = {
-    Smith(): kernels.CORRELATED,
-    Smith(correlated=False): kernels.SEPARABLE,
-    Ashikhmin(): kernels.SEPARABLE,
-    VGroove(): kernels.GROOVE,
-}
+SHADOWINGS: dict[type, int] = {Smith: kernels.CORRELATED, Ashikhmin: kernels.SEPARABLE, VGroove: kernels.GROOVE}
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -43,6 +39,15 @@ class Microfacet(BRDF):
     ndf: NDF = dataclasses.field(default_factory=GGX)
     fresnel: Reflectance = dataclasses.field(default_factory=Fresnel)
     shadowing: Shadowing = Smith()  # noqa: RUF009  (a frozen value)
+
+    def __post_init__(self) -> None:
+        for name, kind in (("ndf", NDF), ("fresnel", Reflectance), ("shadowing", Shadowing)):
+            value = getattr(self, name)
+            if not isinstance(value, kind):
+                raise ParameterError(
+                    f"Microfacet: {name} = {value!r:.60} is no {kind.__name__}. "
+                    "As in Microfacet(GGX(0.3), Fresnel(1.5), Smith())."
+                )
 
     def _f(self, xp: Any, wi: Array, wo: Array) -> Array:
         above = ((wi[..., 2] > 0) & (wo[..., 2] > 0))[..., None]
@@ -63,7 +68,9 @@ class Microfacet(BRDF):
     def _compiled(self, wi: Array, wo: Array) -> Array | None:
         # By exact type: a subclass may have another formula.
         ndf, fresnel = NDFS.get(type(self.ndf)), REFLECTANCES.get(type(self.fresnel))
-        shadowing = SHADOWINGS.get(self.shadowing)
+        shadowing = SHADOWINGS.get(type(self.shadowing))
+        if isinstance(self.shadowing, Smith) and not self.shadowing.correlated:
+            shadowing = kernels.SEPARABLE
         if not isinstance(self.ndf, Slopes) or ndf is None or fresnel is None or shadowing is None:
             return None
         widths = (to_numpy(alpha)[..., None] for alpha in self.ndf.widths())
