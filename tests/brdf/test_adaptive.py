@@ -141,32 +141,32 @@ def test_paper_is_nearly_reciprocal_and_reflects_less_than_it_gets(data):
 def test_samples_fall_by_their_density(rng, kind):
     material = made(MADE[kind])
     wo = from_spherical(0.7, 2.1)
-    wi = material.sample(wo, rng.uniform(size=(40000, 3)))
+    wi = material.sample(wo, rng.uniform(size=(8000, 3)))
     assert np.allclose(np.linalg.norm(wi, axis=-1), 1, atol=1e-12)
     above = wi[:, 2] > 0
-    n = 256
+    n = 96
     z, phi = np.meshgrid((np.arange(n) + 0.5) / n, (np.arange(2 * n) + 0.5) * np.pi / n, indexing="ij")
     grid = from_spherical(np.arccos(z), phi)
     mass = material.pdf(grid, wo) * (2 * np.pi / z.size)
-    # Counts of some 800 a box vary by 3.5 %, the share above the surface by .25 %.
+    # Counts of some 170 a box vary by 8 %, the share above the surface by .5 %.
     boxes = mass.reshape(4, n // 4, 8, n // 4).sum(axis=(1, 3))
-    assert boxes.sum() == pytest.approx(above.mean(), abs=0.008)
+    assert boxes.sum() == pytest.approx(above.mean(), abs=0.018)
     counted, _, _ = np.histogram2d(
         wi[above, 2], np.arctan2(wi[above, 1], wi[above, 0]) % (2 * np.pi), (4, 8), ((0, 1), (0, 2 * np.pi))
     )
     expected = boxes * len(wi)
     chi2 = ((counted - expected) ** 2 / expected).sum()
-    # 32 boxes: chi2 stays below 62 in 999 of 1000 draws; the grid's own error of some .5 % a box is allowed for.
-    assert chi2 < 62 + 32 * (0.005**2 * expected.mean())
+    # 32 boxes: chi2 stays below 62 in 999 of 1000 draws; the grid's own error of some 1 % a box is allowed for.
+    assert chi2 < 62 + 32 * (0.01**2 * expected.mean())
 
 
 def test_sampling_makes_a_measured_material_nearly_constant(rng, data):
     material = read_rgl(data / "brdf" / "rgl" / "satin_rosaline_rgb.bsdf")
     wo = from_spherical(0.8, 0.3)
-    wi = material.sample(wo, rng.uniform(size=(20000, 3)))
+    wi = material.sample(wo, rng.uniform(size=(4000, 3)))
     wi = wi[wi[:, 2] > 0.02]
     weight = material.f(wi, wo)[:, 0] * wi[:, 2] / material.pdf(wi, wo)
-    uniform = from_spherical(np.arccos(rng.uniform(0.02, 1, 20000)), rng.uniform(0, 2 * np.pi, 20000))
+    uniform = from_spherical(np.arccos(rng.uniform(0.02, 1, 8000)), rng.uniform(0, 2 * np.pi, 8000))
     plain = material.f(uniform, wo)[:, 0] * uniform[:, 2] * 2 * np.pi
     assert weight.mean() == pytest.approx(plain.mean(), rel=0.05)
     assert weight.std() / weight.mean() < 0.35 * plain.std() / plain.mean()

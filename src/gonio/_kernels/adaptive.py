@@ -109,9 +109,10 @@ def _cell(u: float, n: int) -> tuple[int, float]:
 def _bilinear(table: np.ndarray, x: float, y: float) -> float:
     row, fy = _cell(y, table.shape[0])
     column, fx = _cell(x, table.shape[1])
-    upper: float = table[row, column] * (1 - fx) + table[row, column + 1] * fx
-    lower: float = table[row + 1, column] * (1 - fx) + table[row + 1, column + 1] * fx
-    return upper * (1 - fy) + lower * fy
+    upper = table[row, column] * (1 - fx) + table[row, column + 1] * fx
+    lower = table[row + 1, column] * (1 - fx) + table[row + 1, column + 1] * fx
+    value: float = upper * (1 - fy) + lower * fy
+    return value
 
 
 @compiled
