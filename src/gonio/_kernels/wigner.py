@@ -118,7 +118,7 @@ def matrices(degree, lowest, alpha, out):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def angles(R):
-    """(alpha, beta, gamma, error): `frames.euler_angles` of one matrix (3, 3), and the squared distance from a rotation."""
+    """(alpha, beta, gamma, error) of a matrix (3, 3): `frames.euler_angles`, and its squared distance from rotations."""
     error = 0.0
     for i in range(3):
         for j in range(i + 1):
@@ -150,13 +150,13 @@ def rotate(coefficients, alpha, beta, gamma, out):
     cos_half, sin_half, side, near = _halves(alpha)
     rows = np.zeros((2, n * n))
     orders, s, ratio, inverse, roots = _tables(degree)
-    first, last, even, odd = np.empty((2, n)), np.empty((2, n)), np.empty(n), np.empty(n)
+    first, last, even, odd = np.empty((2, n)), np.empty((2, n)), np.empty((2, n + 1)), np.empty((2, n + 1))
     for m in range(n):
         first[0, m], first[1, m] = math.cos(m * gamma), math.sin(m * gamma)
         last[0, m], last[1, m] = math.cos(m * beta), math.sin(m * beta)
-    cosines, sines = np.empty((channels, n)), np.empty((channels, n))
-    below_c, below_s = np.empty((channels, n)), np.empty((channels, n))
-    above_c, above_s = np.empty((channels, n)), np.empty((channels, n))
+    cosines, sines = np.zeros((channels, n + 1)), np.zeros((channels, n + 1))
+    below_c, below_s = np.zeros((channels, n + 1)), np.zeros((channels, n + 1))
+    above_c, above_s = np.zeros((channels, n + 1)), np.zeros((channels, n + 1))
     for l in range(n):
         new, old = rows[l & 1], rows[1 - (l & 1)]
         if l > 0:
@@ -170,26 +170,38 @@ def rotate(coefficients, alpha, beta, gamma, out):
                 sines[i, m] = y * first[0, m] + x * first[1, m]
             for m in range(l + 1):
                 above_c[i, m] = above_s[i, m] = 0.0
-        for m in range(l + 1):
-            row = new[m * m : (m + 1) ** 2]
-            if m < l:
-                _advance(l, m, side, near, orders, s, ratio, inverse, row, old[m * m : (m + 1) ** 2])
-            else:
-                _start(l, cos_half, sin_half, roots, row)
-            positive = row[m:]
-            for k in range(m + 1):
-                x, y = positive[k], row[m - k]
-                even[k], odd[k] = (x + y) * (1 / SCALE), (x - y) * (1 / SCALE)
-            sign = 1.0 - 2.0 * (m & 1)
+        # Two rows at a time, so that coefficients are read half as often; where l is even the last one's mate is zero.
+        for m in range(0, l + 1, 2):
+            even[1, : m + 2] = odd[1, : m + 2] = 0.0
+            for upper in range(min(2, l + 1 - m)):
+                order = m + upper
+                part = slice(order * order, (order + 1) ** 2)
+                row = new[part]
+                if order < l:
+                    _advance(l, order, side, near, orders, s, ratio, inverse, row, old[part])
+                else:
+                    _start(l, cos_half, sin_half, roots, row)
+                positive, even_row, odd_row = row[order:], even[upper], odd[upper]
+                for k in range(order + 1):
+                    x, y = positive[k], row[order - k]
+                    even_row[k], odd_row[k] = (x + y) * (1 / SCALE), (x - y) * (1 / SCALE)
             for i in range(channels):
-                x, y = sign * cosines[i, m], sign * sines[i, m]
-                sum_c, sum_s = even[m] * cosines[i, m], odd[m] * sines[i, m]
+                x, y = cosines[i, m], -cosines[i, m + 1]
+                one, two = even[0, m] * x, even[1, m] * x - even[1, m + 1] * y
                 for k in range(m):
-                    sum_c += even[k] * cosines[i, k]
-                    sum_s += odd[k] * sines[i, k]
-                    above_c[i, k] += even[k] * x
-                    above_s[i, k] += odd[k] * y
-                below_c[i, m], below_s[i, m] = sum_c, sum_s
+                    one += even[0, k] * cosines[i, k]
+                    two += even[1, k] * cosines[i, k]
+                    above_c[i, k] += even[0, k] * x + even[1, k] * y
+                above_c[i, m] += even[1, m] * y
+                below_c[i, m], below_c[i, m + 1] = one, two
+                x, y = sines[i, m], -sines[i, m + 1]
+                one, two = odd[0, m] * x, odd[1, m] * x - odd[1, m + 1] * y
+                for k in range(m):
+                    one += odd[0, k] * sines[i, k]
+                    two += odd[1, k] * sines[i, k]
+                    above_s[i, k] += odd[0, k] * x + odd[1, k] * y
+                above_s[i, m] += odd[1, m] * y
+                below_s[i, m], below_s[i, m + 1] = one, two
         for i in range(channels):
             out[at, i] = (below_c[i, 0] + above_c[i, 0]) * math.sqrt(0.5)
             for m in range(1, l + 1):

@@ -31,8 +31,8 @@ def rotate(coefficients: Array, rotation: Array) -> Array:
     require_degree_of_d(degree)
     if coefficients.ndim > 2:
         raise ArrayError(f"coefficients have shape {tuple(coefficients.shape)}: ((degree+1)^2,) or ((degree+1)^2, C).")
-    precise = xp.astype(coefficients, xp.float64)
     if not is_numpy(coefficients):
+        precise = xp.astype(coefficients, xp.float64)
         return xp.astype(_by_quarter_turns(precise, degree, like(rotation, precise)), coefficients.dtype)
     R = np.ascontiguousarray(to_numpy(rotation), dtype=np.float64)
     if R.shape != (3, 3):
@@ -40,7 +40,7 @@ def rotate(coefficients: Array, rotation: Array) -> Array:
     alpha, beta, gamma, error = kernel.angles(R)
     if not error < 1e-10:  # so written that NaN fails too
         require_rotation(R, "rotation")
-    columns = np.ascontiguousarray(precise).reshape(len(precise), -1)
+    columns = np.ascontiguousarray(coefficients, dtype=np.float64).reshape(len(coefficients), -1)
     turned = np.empty_like(columns)
     kernel.rotate(columns, alpha, beta, gamma, turned)
     return turned.reshape(coefficients.shape).astype(coefficients.dtype, copy=False)
