@@ -16,7 +16,7 @@ from ..arrays import Array, is_numpy, like, namespace
 from .azimuth import real_from_waves, turns, waves_of_real
 from .grids import Grid
 
-_PIECE = 2**18  # bytes of values taken at once: they and their transforms stay in the second cache
+_PIECE = 2**19  # bytes of values taken at once: they and their transforms stay in the second or third cache
 
 
 def fold(values: Array, grid: Grid, degree: int) -> Array:
