@@ -11,6 +11,9 @@
 A square picture may be an angular map or a mirror ball, and has to be named. Where nothing says which way a picture
 stands, lat-long maps and cubes are taken for what one sees from inside (Orientation.PANORAMA: ahead is +y), discs and
 paraboloids for Orientation.PROBE. `environment.orientation.name` says what was taken.
+
+Pixels are areas here, as in most programs. OpenEXR's own tools and Mitsuba put the centres of the outermost pixels on
+the picture's edge (Mitsuba the rows only): by at most half a pixel, their directions differ from these.
 """
 
 from __future__ import annotations

@@ -5,7 +5,7 @@
 e is a pixel's luminance times its solid angle, d its direction. Each cluster becomes one beam along its centroid c
 with the exact energy of its pixels, so that what is linear in d is right, and the cost is the second-order error
 of what is not. The most costly rectangle of the picture is cut in two where that saves most, again and again: five
-summed-area tables give the cost of any rectangle from four look-ups each. A pixel like the sun is soon alone.
+summed-area tables give the cost of any rectangle from four look-ups each. A pixel like the sun is soon all but alone.
 
 Median cuts (Debevec 2005) split by energy, and have no notion of how far apart the joined pixels lie.
 """

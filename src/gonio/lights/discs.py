@@ -147,7 +147,7 @@ class MirrorBall(_Radial):
 
     `distance` is the camera's from the ball's centre in radii of the ball (more than 1), infinite where the camera is
     far. A near camera does not see what lies behind the ball, a cone of asin(1/distance) about -Z: such directions
-    are answered with the rim, and solid angles sum to the rest. Solid angles are then good to 1e-5 of a rim pixel's.
+    are answered with the rim, and solid angles sum to the rest. Pixels that the rim cuts are then good to .1 %.
     """
 
     distance: float = math.inf
