@@ -118,7 +118,7 @@ def matrices(degree, lowest, alpha, out):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def angles(R):
-    """(alpha, beta, gamma, error) of a matrix (3, 3): `frames.euler_angles`, and its squared distance from rotations."""
+    """`frames.euler_angles` of one matrix (3, 3), and fourth its squared distance from a rotation."""
     error = 0.0
     for i in range(3):
         for j in range(i + 1):
