@@ -22,6 +22,8 @@ DIELECTRIC, CONDUCTOR, SCHLICK = range(3)
 def microfacet(wi, wo, p, steps, out, ndf, shadowing, fresnel):  # type: ignore[no-untyped-def]
     """Parameters: alpha_x, alpha_y, and the Fresnel term's two (eta; eta, k; f0)."""
     rows, columns, channels = out.shape
+    last_o = last_p = -1
+    go = 0.0
     for i in range(rows):
         for j in range(columns):
             a = i * steps[0] + j * steps[1]
@@ -40,7 +42,10 @@ def microfacet(wi, wo, p, steps, out, ndf, shadowing, fresnel):  # type: ignore[
                     if shadowing == GROOVE:
                         value *= 0.25 * min(1 / min(iz, oz), 4 * z / l2) / max(iz, oz)
                     else:
-                        gi, go = _area(ndf, ix, iy, iz, ax, ay), _area(ndf, ox, oy, oz, ax, ay)
+                        if b != last_o or q != last_p:  # one view, many lights: its area is known
+                            go = _area(ndf, ox, oy, oz, ax, ay)
+                            last_o, last_p = b, q
+                        gi = _area(ndf, ix, iy, iz, ax, ay)
                         if shadowing == CORRELATED:
                             value *= 0.25 / (gi * oz + go * iz - iz * oz)
                         else:
