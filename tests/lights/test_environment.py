@@ -70,8 +70,8 @@ def test_a_pixel_has_its_value_at_its_centre(mapping, rows, rng):
 @pytest.mark.parametrize(("mapping", "rows"), [m for m in LAYOUTS if isinstance(m[0], gn.LatLongMap | gn.CubeStrip)])
 def test_look_ups_have_no_seam(mapping, rows, rng):
     # Along a great circle in 20,000 steps a seam would be a jump of noise in [0, 1], some .3; a texel of a few
-    # degrees takes a hundred steps or more, ten near a pole. (Discs have a rim on which many pixels show one direction, and
-    # each half of a paraboloid pair keeps its own pixels to the horizon.)
+    # degrees takes a hundred steps or more, ten near a pole. (Discs have a rim on which many pixels show one direction,
+    # and each half of a paraboloid pair keeps its own pixels to the horizon.)
     e = gn.Environment(rng.random((*mapping.shape(rows), 1)), mapping)
     angle = np.linspace(0, 2 * math.pi, 20_001)
     for a, b in ((0, 1), (0, 2), (1, 2)):
