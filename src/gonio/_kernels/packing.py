@@ -1,6 +1,6 @@
-"""Coefficients and rows brought to where the sums over theta read them, and back, in one pass over each.
+"""Coefficients and rows brought to where the sums over theta read them, and back, for some orders at a time.
 
-The array code beside the callers (`sphere/packing.py`, `sphere/transform.py`) says the same for other libraries.
+The array code of `sphere/packing.py` and `sphere/folding.py` says the same for arrays of other libraries.
 """
 
 from __future__ import annotations
@@ -9,93 +9,84 @@ import math
 
 from numba import njit
 
-_TILE = 16  # orders: the cache lines that a tile writes, for a few channels, stay in the first cache
-
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def fold(north, south, turn, low, rings):  # type: ignore[no-untyped-def]
-    """rings[m, (even re, even -im, odd re, odd -im) c, r] for the rows r = low, low + 1, ... of `north`.
+def fold(waves, turn, low, rings):  # type: ignore[no-untyped-def]
+    """rings (orders, 4 C, northern rows and equator) of the orders low, low + 1, ... of waves (rows, all orders, C).
 
-    north, south: (some rows, orders or more, C), a row and its mirror image; even is their sum, odd the difference,
-    both turned by turn[m].
+    Parts of C channels: real and negative imaginary part of the sum of a row and its mirror image, and the same of the
+    difference; both turned by turn[order]. The equator is its own image and counts once.
     """
-    rows, _, channels = north.shape
-    for tile in range(0, turn.size, _TILE):
-        stop = min(tile + _TILE, turn.size)
-        for r in range(rows):
-            for m in range(tile, stop):
-                for c in range(channels):
-                    even = (north[r, m, c] + south[r, m, c]) * turn[m]
-                    odd = (north[r, m, c] - south[r, m, c]) * turn[m]
-                    rings[m, c, low + r] = even.real
-                    rings[m, channels + c, low + r] = -even.imag
-                    rings[m, 2 * channels + c, low + r] = odd.real
-                    rings[m, 3 * channels + c, low + r] = -odd.imag
+    rows, _, channels = waves.shape
+    for r in range(rings.shape[2]):
+        north, south = waves[r], waves[rows - 1 - r]
+        share = 0.5 if 2 * r == rows - 1 else 1.0
+        for m in range(rings.shape[0]):
+            by = turn[low + m] * share
+            for c in range(channels):
+                even = (north[low + m, c] + south[low + m, c]) * by
+                odd = (north[low + m, c] - south[low + m, c]) * by
+                rings[m, c, r] = even.real
+                rings[m, channels + c, r] = -even.imag
+                rings[m, 2 * channels + c, r] = odd.real
+                rings[m, 3 * channels + c, r] = -odd.imag
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def unfold(rings, turn, cosines, low, north, south):  # type: ignore[no-untyped-def]
-    """north, south (some rows, orders or more, C) from rings[m, (even cos, even sin, odd cos, odd sin) c, low + r].
+def unfold(rings, turn, cosines, low, waves):  # type: ignore[no-untyped-def]
+    """Fill the orders low, low + 1, ... of `waves` from `rings`, shaped as in `fold`.
 
-    cos - i sin, turned by turn[m]; the odd parts are multiplied by cosines[low + r]. Further orders are left alone.
+    cos - i sin, turned by turn[order]; the odd parts are multiplied by cosines[r].
     """
-    rows, _, channels = north.shape
-    for tile in range(0, turn.size, _TILE):
-        stop = min(tile + _TILE, turn.size)
-        for r in range(rows):
-            at = low + r
-            for m in range(tile, stop):
-                for c in range(channels):
-                    even = complex(rings[m, c, at], -rings[m, channels + c, at]) * turn[m]
-                    odd = complex(rings[m, 2 * channels + c, at], -rings[m, 3 * channels + c, at]) * turn[m]
-                    north[r, m, c] = even + odd * cosines[at]
-                    south[r, m, c] = even - odd * cosines[at]
+    rows, _, channels = waves.shape
+    for r in range(rings.shape[2]):
+        for m in range(rings.shape[0]):
+            for c in range(channels):
+                even = complex(rings[m, c, r], -rings[m, channels + c, r]) * turn[low + m]
+                odd = complex(rings[m, 2 * channels + c, r], -rings[m, 3 * channels + c, r]) * turn[low + m]
+                waves[rows - 1 - r, low + m, c] = even - odd * cosines[r]
+                waves[r, low + m, c] = even + odd * cosines[r]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def pack(flat, inverse, coupling, packed):  # type: ignore[no-untyped-def]
-    """`sphere.packing.pack`: packed (orders, steps, 4 C) from flat ((degree + 1)^2, C)."""
-    orders, steps = packed.shape[:2]
+def pack(flat, degree, inverse, coupling, low, packed):  # type: ignore[no-untyped-def]
+    """Packed coefficients (orders, steps, 4 C) of the orders low, low + 1, ... from flat ((degree + 1)^2, C)."""
     channels = flat.shape[1]
-    for m in range(orders):
-        root = math.sqrt(2.0) if m else 1.0
-        packed[m] = 0
-        for i in range((orders - 1 - m) // 2, -1, -1):
-            l = m + 2 * i
-            at, above = l * (l + 1), (l + 1) * (l + 2)
+    packed[:] = 0
+    for l in range(degree, low - 1, -1):
+        for m in range(low, min(low + packed.shape[0], l + 1)):
+            root = math.sqrt(2.0) if m else 1.0
+            step, odd = (l - m) // 2, (l - m) % 2
+            row = packed[m - low, step]
             for c in range(channels):
-                packed[m, i, c] = root * flat[at + m, c]
-                if m:
-                    packed[m, i, channels + c] = root * flat[at - m, c]
-                if l + 1 < orders:
-                    cosine, sine = root * flat[above + m, c], root * flat[above - m, c] if m else 0.0
-                    if i + 1 < steps:
-                        cosine -= coupling[i, m] * packed[m, i + 1, 2 * channels + c]
-                        sine -= coupling[i, m] * packed[m, i + 1, 3 * channels + c]
-                    packed[m, i, 2 * channels + c] = inverse[i, m] * cosine
-                    packed[m, i, 3 * channels + c] = inverse[i, m] * sine
+                cosine, sine = root * flat[l * (l + 1) + m, c], root * flat[l * (l + 1) - m, c] if m else 0.0
+                if odd:
+                    if l + 2 <= degree:
+                        above = packed[m - low, step + 1]
+                        cosine -= coupling[step, m] * above[2 * channels + c]
+                        sine -= coupling[step, m] * above[3 * channels + c]
+                    row[2 * channels + c] = inverse[step, m] * cosine
+                    row[3 * channels + c] = inverse[step, m] * sine
+                else:
+                    row[c] = cosine
+                    row[channels + c] = sine
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def unpack(packed, inverse, coupling, flat):  # type: ignore[no-untyped-def]
-    """`sphere.packing.unpack`: flat ((degree + 1)^2, C) from packed (orders, steps, 4 C), which is overwritten."""
-    orders = packed.shape[0]
+def unpack(packed, degree, inverse, coupling, low, flat):  # type: ignore[no-untyped-def]
+    """Fill the orders low, low + 1, ... of `flat` from packed sums, which are overwritten."""
     channels = flat.shape[1]
-    for m in range(orders):
-        root = math.sqrt(2.0) if m else 1.0
-        for i in range((orders - 1 - m) // 2 + 1):
-            l = m + 2 * i
-            at, above = l * (l + 1), (l + 1) * (l + 2)
-            for c in range(channels):
-                flat[at + m, c] = root * packed[m, i, c]
-                if m:
-                    flat[at - m, c] = root * packed[m, i, channels + c]
-            if l + 1 < orders:
+    for l in range(low, degree + 1):
+        for m in range(low, min(low + packed.shape[0], l + 1)):
+            root = math.sqrt(2.0) if m else 1.0
+            step, odd = (l - m) // 2, (l - m) % 2
+            row = packed[m - low, step]
+            if odd:
                 for k in range(2 * channels, 4 * channels):
-                    if i:
-                        packed[m, i, k] -= coupling[i - 1, m] * packed[m, i - 1, k]
-                    packed[m, i, k] *= inverse[i, m]
-                for c in range(channels):
-                    flat[above + m, c] = root * packed[m, i, 2 * channels + c]
-                    if m:
-                        flat[above - m, c] = root * packed[m, i, 3 * channels + c]
+                    if step:
+                        row[k] -= coupling[step - 1, m] * packed[m - low, step - 1, k]
+                    row[k] *= inverse[step, m]
+            for c in range(channels):
+                if m:
+                    flat[l * (l + 1) - m, c] = root * row[(2 * odd + 1) * channels + c]
+                flat[l * (l + 1) + m, c] = root * row[2 * odd * channels + c]

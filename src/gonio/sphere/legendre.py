@@ -41,16 +41,16 @@ class Recursion:
     stop: np.ndarray
     t: np.ndarray  # (rings,): the argument, cos theta or its square
 
-    def synthesise(self, coefficients: np.ndarray) -> np.ndarray:
-        """(orders, steps, channels) -> (orders, channels, rings)."""
+    def synthesise(self, coefficients: np.ndarray, orders: slice = slice(None)) -> np.ndarray:
+        """(orders, steps, channels) -> (orders, channels, rings), for all orders or some."""
         rings = np.empty((coefficients.shape[0], coefficients.shape[2], self.t.size), coefficients.dtype)
-        kernels.synthesise(coefficients, *self._arguments(), rings)
+        kernels.synthesise(coefficients, *self._arguments(orders), rings)
         return rings
 
-    def analyse(self, rings: np.ndarray) -> np.ndarray:
-        """(orders, channels, rings) -> (orders, steps, channels)."""
+    def analyse(self, rings: np.ndarray, orders: slice = slice(None)) -> np.ndarray:
+        """(orders, channels, rings) -> (orders, steps, channels), for all orders or some."""
         coefficients = np.empty((rings.shape[0], self.a.shape[1], rings.shape[1]), rings.dtype)
-        kernels.analyse(rings, *self._arguments(), coefficients)
+        kernels.analyse(rings, *self._arguments(orders), coefficients)
         return coefficients
 
     def table(self, m: int) -> np.ndarray:
@@ -60,8 +60,9 @@ class Recursion:
         table[self.count[m] :] = 0
         return table
 
-    def _arguments(self) -> tuple[np.ndarray, ...]:
-        return self.start, self.level, self.a, self.b, self.c, self.count, self.first, self.stop, self.t
+    def _arguments(self, orders: slice) -> tuple[np.ndarray, ...]:
+        fields = (self.start, self.level, self.a, self.b, self.c, self.count, self.first, self.stop)
+        return *(x[orders] for x in fields), self.t
 
 
 @lru_cache(maxsize=8)

@@ -16,9 +16,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from .._kernels import packing as kernels
 from .._kernels.legendre import EIGHT
-from ..arrays import Array, is_numpy, like, namespace
+from ..arrays import Array, like, namespace
 from .harmonics import degrees_and_orders
 from .legendre import odd_factors
 
@@ -36,12 +35,8 @@ class _Places:
 
 def pack(flat: Array, degree: int) -> Array:
     """Coefficients in the real harmonics, packed."""
-    places = _folded_places(degree)
-    if is_numpy(flat):
-        packed = np.empty((*places.flat.shape[:2], 4 * flat.shape[1]), flat.dtype)
-        kernels.pack(flat, *odd_factors(degree, packed.shape[1]), packed)
-        return packed
     xp = namespace(flat)
+    places = _folded_places(degree)
     packed = _taken(flat, places.flat).reshape(*places.flat.shape[:2], -1) * _root_two(degree, flat)
     half = 2 * flat.shape[1]
     inverse, coupling = (like(x, flat)[..., None] for x in odd_factors(degree, packed.shape[1]))
@@ -53,13 +48,9 @@ def pack(flat: Array, degree: int) -> Array:
 
 
 def unpack(packed: Array, degree: int) -> Array:
-    """Coefficients in the real harmonics, from packed sums (NumPy arrays of them are overwritten)."""
-    half = packed.shape[2] // 2
-    if is_numpy(packed):
-        flat = np.empty(((degree + 1) ** 2, half // 2), packed.dtype)
-        kernels.unpack(packed, *odd_factors(degree, packed.shape[1]), flat)
-        return flat
+    """Coefficients in the real harmonics, from packed sums."""
     xp = namespace(packed)
+    half = packed.shape[2] // 2
     inverse, coupling = (like(x, packed)[..., None] for x in odd_factors(degree, packed.shape[1]))
     odd: list[Array] = []
     for i in range(packed.shape[1]):

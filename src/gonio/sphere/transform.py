@@ -18,11 +18,13 @@ First a Fourier sum over each row (`azimuth.py`), then for every order m a sum o
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from ..arrays import Array, floats, is_numpy, like, namespace, require_finite
 from ..errors import ArrayError, ParameterError
-from . import low_degree
+from . import fast, low_degree
 from .azimuth import complex_from_waves, waves_of_complex
 from .folding import fold, unfold
 from .grids import Grid
@@ -41,15 +43,14 @@ def analysis(values: Array, grid: Grid, degree: int) -> Array:
     _require_carried(degree, grid)
     xp, values = floats(values)
     rows = _on_grid(values, grid)
-    if _is_low(values, grid, degree):
-        return _result(low_degree.analyse(rows, grid, degree), values)
+    if is_numpy(rows):
+        return _result(_numpy_way(grid, degree).analyse(rows, grid, degree), values)
     rings = fold(rows, grid, degree)
     half = rings.shape[1] // 2
-    parts = [
-        weighted(part, grid, degree, 0, symmetry) for symmetry, part in enumerate((rings[:, :half], rings[:, half:]))
-    ]
-    rings = rings if is_numpy(rings) else xp.concat(parts, axis=1)
-    return _result(unpack(_projections(folded_recursion(grid, degree), rings), degree), values)
+    even = weighted(rings[:, :half, :], grid, degree, 0, 0)
+    odd = weighted(rings[:, half:, :], grid, degree, 0, 1)
+    packed = _projections(folded_recursion(grid, degree), xp.concat((even, odd), axis=1))
+    return _result(unpack(packed, degree), values)
 
 
 def synthesis(coefficients: Array, grid: Grid) -> Array:
@@ -61,8 +62,8 @@ def synthesis(coefficients: Array, grid: Grid) -> Array:
     _, coefficients = floats(coefficients)
     degree = _carried(coefficients, grid)
     flat = _channels(coefficients, 1)
-    if _is_low(flat, grid, degree):
-        values = low_degree.synthesise(flat, grid, degree)
+    if is_numpy(flat):
+        values = _numpy_way(grid, degree).synthesise(flat, grid, degree)
     else:
         values = unfold(_sums(folded_recursion(grid, degree), pack(flat, degree)), grid)
     return values if coefficients.ndim == 2 else values[..., 0]
@@ -102,9 +103,10 @@ def synthesis_spin(coefficients: Array, grid: Grid, spin: int) -> Array:
     return values if coefficients.ndim == 2 else values[..., 0]
 
 
-def _is_low(x: Array, grid: Grid, degree: int) -> bool:
-    """Whether one pass over the image is the faster way, and exact."""
-    return is_numpy(x) and degree <= low_degree.HIGHEST and grid.columns % 2 == 0 and 2 * degree < grid.rows
+def _numpy_way(grid: Grid, degree: int) -> Any:
+    """The faster of the two ways by kernels: one pass over the image for a few degrees, where that is exact."""
+    few = degree <= low_degree.HIGHEST and grid.columns % 2 == 0 and 2 * degree < grid.rows
+    return low_degree if few else fast
 
 
 def _quarters(rings: Array) -> list[Array]:
