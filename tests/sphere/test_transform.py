@@ -1,3 +1,5 @@
+import os
+
 import numpy as np
 import pytest
 from reference import legendre as plain
@@ -24,7 +26,10 @@ GRIDS = [
     (LatLong(20, 40), 8),  # few degrees: one pass over the image
     (LatLong(9, 14), 4),
 ]
+LARGE = [(LatLong(256, 512), 30), (GaussLegendre(200), 200), (LatLong(201, 402), 200)]
 SPINS = [0, 1, -2, 5]
+
+compiled = pytest.mark.skipif(bool(os.environ.get("NUMBA_DISABLE_JIT")), reason="too large for uncompiled kernels")
 
 
 def coefficients(rng, degree, spin=None, channels=2):
@@ -55,16 +60,16 @@ def test_synthesis_is_the_sum_of_spin_weighted_harmonics(spin, rng):
     close(gn.synthesis_spin(f, grid, spin), expected, atol=1e-13)
 
 
-@pytest.mark.parametrize(
-    ("grid", "degree"), [*GRIDS, (LatLong(256, 512), 30), (GaussLegendre(200), 200), (LatLong(201, 402), 200)]
-)
+@pytest.mark.parametrize(("grid", "degree"), [*GRIDS, *(pytest.param(*large, marks=compiled) for large in LARGE)])
 def test_analysis_undoes_synthesis(grid, degree, rng):
     f = coefficients(rng, degree, channels=3)
     close(gn.analysis(gn.synthesis(f, grid), grid, degree), f, atol=1e-12)
 
 
 @pytest.mark.parametrize("spin", SPINS)
-@pytest.mark.parametrize(("grid", "degree"), [*GRIDS[:6], (GaussLegendre(150), 150), (LatLong(151, 302), 150)])
+@pytest.mark.parametrize(
+    ("grid", "degree"), [*GRIDS[:6], *(pytest.param(*large, marks=compiled) for large in LARGE[1:])]
+)
 def test_analysis_undoes_synthesis_with_spin(grid, degree, spin, rng):
     f = coefficients(rng, degree, spin, 1)
     close(gn.analysis_spin(gn.synthesis_spin(f, grid, spin), grid, degree, spin), f, atol=1e-12)
@@ -101,6 +106,7 @@ def test_conjugation_turns_the_spin(rng):
     close(gn.synthesis_spin(mirrored, grid, -2), expected, atol=1e-13)
 
 
+@compiled
 def test_degree_600_neither_overflows_nor_drowns(rng):
     # At high order the functions start below 1e-300 and still reach 1 at a higher degree.
     grid, degree = GaussLegendre(600), 600
@@ -112,6 +118,7 @@ def test_degree_600_neither_overflows_nor_drowns(rng):
     close(gn.analysis(values, grid, degree), f, atol=1e-11)
 
 
+@compiled
 def test_transforms_agree_with_ducc(rng):
     ducc0 = pytest.importorskip("ducc0")
     from gonio.sphere.harmonics import complex_from_real
@@ -127,6 +134,7 @@ def test_transforms_agree_with_ducc(rng):
     close(gn.synthesis(f, grid), expected, atol=1e-10)
 
 
+@compiled
 def test_float32_stays_float32_and_is_accurate(rng):
     grid, f = LatLong(128, 256), coefficients(rng, 60)
     values = gn.synthesis(f.astype(np.float32), grid)
