@@ -69,6 +69,4 @@ def test_tensors_are_answered_with_tensors(rng):
     answer = irradiance(torch.tensor(light), torch.tensor(n))
     assert isinstance(answer, torch.Tensor)
     np.testing.assert_allclose(answer.numpy(), irradiance(light, n), atol=1e-13)
-    np.testing.assert_allclose(
-        irradiance_matrix(torch.tensor(light)).numpy(), irradiance_matrix(light), atol=1e-15
-    )
+    np.testing.assert_allclose(irradiance_matrix(torch.tensor(light)).numpy(), irradiance_matrix(light), atol=1e-15)

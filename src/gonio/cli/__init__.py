@@ -6,11 +6,12 @@ Exit 0 done, 1 did not converge, 2 bad use or input, 130 stopped by Ctrl-C. An e
 
 from __future__ import annotations
 
+import functools
 import sys
 import warnings
+from collections.abc import Callable
 from typing import Any
 
-import click
 import typer
 
 from ..errors import GonioError
@@ -25,6 +26,7 @@ app = typer.Typer(
 
 
 def version(asked: bool) -> None:
+    """Print the version and leave, where asked."""
     if asked:
         from gonio import __version__
 
@@ -39,32 +41,32 @@ def gonio(
     """From photographs of a known shape to reflectance and light that you can render."""
 
 
+def guarded(verb: Callable[..., None]) -> Callable[..., None]:
+    """`verb`, with its refusals turned into one line and an exit code."""
+
+    @functools.wraps(verb)
+    def run(**arguments: Any) -> None:
+        try:
+            verb(**arguments)
+        except GonioError as error:
+            print(f"gonio: error: {error}", file=sys.stderr)
+            raise typer.Exit(2) from None
+        except KeyboardInterrupt:
+            print("gonio: stopped", file=sys.stderr)
+            raise typer.Exit(130) from None
+
+    return run
+
+
 for verb in (info.info, convert.convert, render.render, demo.demo):
-    app.command(no_args_is_help=verb is not demo.demo)(verb)
+    app.command(no_args_is_help=verb is not demo.demo)(guarded(verb))
 
 
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line and exit with its code."""
     warnings.showwarning = _one_line
-    try:
-        code = app(arguments, standalone_mode=False)
-    except GonioError as error:
-        code = _refuse(str(error))
-    except click.ClickException as error:
-        error.show(sys.stderr)
-        code = 2
-    except (click.Abort, KeyboardInterrupt):
-        print("gonio: stopped", file=sys.stderr)
-        code = 130
-    except BrokenPipeError:  # the reader of our output has gone (gonio info ... | head)
-        code = 0
-    sys.exit(code or 0)
+    app(arguments)
 
 
-def _refuse(message: str) -> int:
-    print(f"gonio: error: {message}", file=sys.stderr)
-    return 2
-
-
-def _one_line(message: Warning | str, category: type[Warning], *_: Any, **__: Any) -> None:
+def _one_line(message: Warning | str, *_: Any, **__: Any) -> None:
     print(f"gonio: warning: {message}", file=sys.stderr)

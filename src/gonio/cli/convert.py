@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from ..errors import ParameterError
 from .render import Curve, write
 
 if TYPE_CHECKING:
+    from ..lights.environment import Environment
     from ..lights.mappings import Mapping
     from ..lights.orientation import Orientation
 
@@ -18,28 +20,28 @@ if TYPE_CHECKING:
 class Layout(enum.StrEnum):
     """Layouts of environment maps by name."""
 
-    latlong = "latlong"
-    angular = "angular"
-    ball = "ball"
-    paraboloid = "paraboloid"
-    cross = "cross"
-    cross_wide = "cross-wide"
-    strip = "strip"
-    strip_wide = "strip-wide"
+    LATLONG = "latlong"
+    ANGULAR = "angular"
+    BALL = "ball"
+    PARABOLOID = "paraboloid"
+    CROSS = "cross"
+    CROSS_WIDE = "cross-wide"
+    STRIP = "strip"
+    STRIP_WIDE = "strip-wide"
 
     def mapping(self) -> Mapping:
         """The layout itself."""
         import gonio as gn
 
         return {
-            Layout.latlong: gn.LatLongMap(),
-            Layout.angular: gn.AngularMap(),
-            Layout.ball: gn.MirrorBall(),
-            Layout.paraboloid: gn.DualParaboloid(),
-            Layout.cross: gn.CubeCross(vertical=True),
-            Layout.cross_wide: gn.CubeCross(vertical=False),
-            Layout.strip: gn.CubeStrip(vertical=True),
-            Layout.strip_wide: gn.CubeStrip(vertical=False),
+            Layout.LATLONG: gn.LatLongMap(),
+            Layout.ANGULAR: gn.AngularMap(),
+            Layout.BALL: gn.MirrorBall(),
+            Layout.PARABOLOID: gn.DualParaboloid(),
+            Layout.CROSS: gn.CubeCross(vertical=True),
+            Layout.CROSS_WIDE: gn.CubeCross(vertical=False),
+            Layout.STRIP: gn.CubeStrip(vertical=True),
+            Layout.STRIP_WIDE: gn.CubeStrip(vertical=False),
         }[self]
 
 
@@ -52,22 +54,26 @@ def convert(
     to_orientation: str = typer.Option("", "--to-orientation", help="The tool that will read the map written."),
     rows: int | None = typer.Option(None, "--rows", min=1, help="Rows of the map written; else as fine as the source."),
     exposure: float = typer.Option(0.0, "--exposure", help="Stops, where the output is PNG."),
-    curve: Curve = typer.Option(Curve.filmic, "--curve", help="Tone curve, where the output is PNG."),
+    curve: Curve = typer.Option(Curve.FILMIC, "--curve", help="Tone curve, where the output is PNG."),
 ) -> None:
     """Convert an image's format, or (with --to) an environment map's layout and orientation."""
     import gonio as gn
-    from gonio.files.environments import picture
+    from gonio.files.environments import as_picture
 
     if to is None and layout is None and not orientation and not to_orientation and rows is None and len(source) == 1:
         write(output, gn.read_image(source[0]), exposure, curve)
         typer.echo(str(output))
         return
     environment = gn.read_environment(
-        source[0] if len(source) == 1 else source, layout and layout.mapping(), named(orientation)
+        source[0] if len(source) == 1 else source, layout.mapping() if layout else None, named(orientation)
     )
-    image = picture(environment, to and to.mapping(), named(to_orientation), rows)
-    write(output, image, exposure, curve)
-    typer.echo(f"{output}  (read as {type(environment.mapping).__name__}, {environment.orientation.name})")
+    written = as_picture(environment, to.mapping() if to else None, named(to_orientation), rows)
+    write(output, written.image, exposure, curve)
+    typer.echo(f"{output}  {_stands(environment)} -> {_stands(written)}")
+
+
+def _stands(environment: Environment) -> str:
+    return f"{type(environment.mapping).__name__} {environment.orientation.name}"
 
 
 def named(orientation: str) -> Orientation | None:
@@ -79,5 +85,5 @@ def named(orientation: str) -> Orientation | None:
     key = orientation.upper().replace("-", "_").replace(".", "_")
     if key not in PUBLISHED:
         known = ", ".join(name.lower().replace("_", "-") for name in PUBLISHED)
-        raise typer.BadParameter(f"'{orientation}' is no published orientation; those are {known}.")
+        raise ParameterError(f"'{orientation}' is no published orientation; those are {known}.")
     return PUBLISHED[key]

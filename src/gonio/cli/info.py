@@ -62,7 +62,9 @@ def _image(path: Path) -> dict[str, Any]:
         "samples": header.dtype,
         "encoding": header.encoding or "not stated",
         "mean": image.mean(axis=(0, 1)).tolist(),
-        "luminance": {"least": float(bright.min()), "median": float(np.median(bright)), "greatest": float(bright.max())},
+        "luminance": {
+            name: float(of(bright)) for name, of in (("least", np.min), ("median", np.median), ("most", np.max))
+        },
     }
     layout = _layout(path)
     if layout:

@@ -1,8 +1,8 @@
 """What a person types, turned into values: reflectance, lights, vectors, sizes. Nothing typed is ever run.
 
-    --brdf lambert:albedo=.5/.3/.1  --brdf ggx:alpha=.2,eta=1.5         terms that are added
-    --brdf gold.bsdf                                                    a measured file
-    --sun 1,0,1   --sun 1,0,1:3/2.8/2.5                                 direction[:irradiance]
+--brdf lambert:albedo=.5/.3/.1  --brdf ggx:alpha=.2,eta=1.5         terms that are added
+--brdf gold.bsdf                                                    a measured file
+--sun 1,0,1   --sun 1,0,1:3/2.8/2.5                                 direction[:irradiance]
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from functools import reduce
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import typer
+from ..errors import ParameterError
 
 if TYPE_CHECKING:
     from ..brdf.model import BRDF
@@ -37,14 +37,14 @@ def numbers(text: str, separator: str = ",") -> tuple[float, ...]:
     try:
         return tuple(float(part) for part in text.split(separator))
     except ValueError:
-        raise typer.BadParameter(f"'{text}' is not numbers separated by '{separator}'.") from None
+        raise ParameterError(f"'{text}' is not numbers separated by '{separator}'.") from None
 
 
 def vector(text: str) -> tuple[float, float, float]:
     """`1,0,.5` -> three numbers."""
     values = numbers(text)
     if len(values) != 3:
-        raise typer.BadParameter(f"'{text}' has {len(values)} numbers; a vector is x,y,z.")
+        raise ParameterError(f"'{text}' has {len(values)} numbers; a vector is x,y,z.")
     return values[0], values[1], values[2]
 
 
@@ -54,9 +54,9 @@ def size(text: str) -> tuple[int, int]:
     try:
         columns, rows = int(width), int(height or width)
     except ValueError:
-        raise typer.BadParameter(f"'{text}' is not a size; write 640x480, or 512 for a square.") from None
+        raise ParameterError(f"'{text}' is not a size; write 640x480, or 512 for a square.") from None
     if min(columns, rows) < 1:
-        raise typer.BadParameter(f"'{text}' has no pixels.")
+        raise ParameterError(f"'{text}' has no pixels.")
     return columns, rows
 
 
@@ -84,7 +84,7 @@ def _term(text: str) -> BRDF:
         known = [*ANALYTIC, *FACETS]
         near = difflib.get_close_matches(name, known, n=1)
         hint = f" Did you mean {near[0]}?" if near else ""
-        raise typer.BadParameter(f"'{name}' is neither a file nor a model ({', '.join(known)}).{hint}")
+        raise ParameterError(f"'{name}' is neither a file nor a model ({', '.join(known)}).{hint}")
     given = dict(_pair(part, text) for part in rest.split(",")) if rest else {}
     weight = given.pop("weight", None)
     if name in FACETS:
@@ -112,7 +112,7 @@ def _made(model: Any, given: dict[str, Any], text: str) -> Any:
     fields = [field.name for field in dataclasses.fields(model) if field.init]
     for key in given:
         if key not in fields:
-            raise typer.BadParameter(f"'{text}': {model.__name__} has no '{key}'; it has {', '.join(fields)}.")
+            raise ParameterError(f"'{text}': {model.__name__} has no '{key}'; it has {', '.join(fields)}.")
     missing = [
         field.name
         for field in dataclasses.fields(model)
@@ -122,14 +122,14 @@ def _made(model: Any, given: dict[str, Any], text: str) -> Any:
         and field.name not in given
     ]
     if missing:
-        raise typer.BadParameter(f"'{text}': {model.__name__} also needs {', '.join(missing)}.")
+        raise ParameterError(f"'{text}': {model.__name__} also needs {', '.join(missing)}.")
     return model(**given)
 
 
 def _pair(part: str, text: str) -> tuple[str, Any]:
     key, equals, value = part.partition("=")
     if not equals:
-        raise typer.BadParameter(f"'{text}': '{part}' is not key=value.")
+        raise ParameterError(f"'{text}': '{part}' is not key=value.")
     return key.strip().replace("-", "_"), _value(value)
 
 

@@ -10,17 +10,18 @@ from contextlib import contextmanager
 @contextmanager
 def bar(label: str) -> Iterator[Callable[[int, int], None]]:
     """`with bar("render") as progress: work(progress=progress)`. Silent where stderr is not a terminal."""
+    from rich import progress
     from rich.console import Console
-    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
     columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TaskProgressColumn(),
-        TimeElapsedColumn(),
-        TextColumn("left"),
-        TimeRemainingColumn(),
+        progress.TextColumn("{task.description}"),
+        progress.BarColumn(),
+        progress.TaskProgressColumn(),
+        progress.TimeElapsedColumn(),
+        progress.TextColumn("left"),
+        progress.TimeRemainingColumn(),
     )
-    with Progress(*columns, console=Console(file=sys.stderr), disable=not sys.stderr.isatty(), transient=True) as shown:
+    stderr = Console(file=sys.stderr)
+    with progress.Progress(*columns, console=stderr, disable=not sys.stderr.isatty(), transient=True) as shown:
         task = shown.add_task(label, total=None)
         yield lambda done, total: shown.update(task, completed=done, total=total)

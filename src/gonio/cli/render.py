@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import enum
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,9 +19,9 @@ if TYPE_CHECKING:
 class Curve(enum.StrEnum):
     """Tone curves by name."""
 
-    filmic = "filmic"
-    reinhard = "reinhard"
-    linear = "linear"
+    FILMIC = "filmic"
+    REINHARD = "reinhard"
+    LINEAR = "linear"
 
 
 def render(
@@ -42,7 +43,7 @@ def render(
     background: bool = typer.Option(True, "--background/--no-background", help="Show the environment behind."),
     relief: float = typer.Option(1.0, "--relief", help="What an image of heights is multiplied by, in pixels."),
     exposure: float = typer.Option(0.0, "--exposure", help="Stops, for PNG."),
-    curve: Curve = typer.Option(Curve.filmic, "--curve", help="Tone curve, for PNG."),
+    curve: Curve = typer.Option(Curve.FILMIC, "--curve", help="Tone curve, for PNG."),
 ) -> None:
     """Render a shape with a BRDF under environment maps and directional lights."""
     import gonio as gn
@@ -78,7 +79,11 @@ def write(output: Path, image: Any, exposure: float, curve: Curve) -> None:
     from gonio.rendering import tonemap
 
     if output.suffix.lower() == ".png":
-        curves = {Curve.filmic: tonemap.Filmic(), Curve.reinhard: tonemap.Reinhard(), Curve.linear: tonemap.clipped}
+        curves: dict[Curve, Callable[[Any], Any]] = {
+            Curve.FILMIC: tonemap.Filmic(),
+            Curve.REINHARD: tonemap.Reinhard(),
+            Curve.LINEAR: tonemap.clipped,
+        }
         image = gn.tone_map(image, curves[curve], exposure)
     gn.write_image(output, image)
 

@@ -67,11 +67,8 @@ def read_environment(
         said, stands = mapping or CubeStrip(), None
     else:
         raise FileError(f"{len(paths)} files make no environment: pass one, a front and a back, or six faces.")
-    if orientation is None:
-        upright = isinstance(said, LatLongMap | CubeCross | CubeStrip)
-        orientation = stands or (Orientation.PANORAMA if upright else Orientation.PROBE)
     try:
-        return Environment(image, said, orientation)
+        return Environment(image, said, orientation or stands or _unsaid(said))
     except ArrayError as error:
         raise FileError(f"{paths[0]}: {error}") from error
 
@@ -85,16 +82,37 @@ def write_environment(
 ) -> None:
     """Writes the picture that `read_environment(path, mapping, orientation)` reads back, in the format of the suffix.
 
+    mapping, orientation and rows as `as_picture` takes them.
+    """
+    write_image(path, as_picture(environment, mapping, orientation, rows).image)
+
+
+def as_picture(
+    environment: Environment,
+    mapping: Mapping | None = None,
+    orientation: Orientation | None = None,
+    rows: int | None = None,
+) -> Environment:
+    """The environment as the picture that a file will hold.
+
     mapping: the layout, the environment's own where None. orientation: the tool's that will read it; where None, what
     is read without saying (PANORAMA, or PROBE for discs and paraboloids). rows: of the picture; where None, its own,
     or as many as keep the resolution in another layout. Pixels are only resampled where they must be.
     """
     mapping = mapping or environment.mapping
-    if orientation is None:
-        upright = isinstance(mapping, LatLongMap | CubeCross | CubeStrip)
-        orientation = Orientation.PANORAMA if upright else Orientation.PROBE
-    rows = rows or _rows(environment, mapping)
-    write_image(path, environment.resampled(mapping, rows, orientation).image)
+    return environment.resampled(mapping, rows or _rows(environment, mapping), orientation or _unsaid(mapping))
+
+
+def layout_of(path: str | os.PathLike[str]) -> tuple[Mapping, Orientation]:
+    """What `read_environment` takes a picture for, from its header. Raises `FileError` where that cannot be told."""
+    mapping, orientation = _layout(Path(path))
+    return mapping, orientation or _unsaid(mapping)
+
+
+def _unsaid(mapping: Mapping) -> Orientation:
+    """Which way a picture is taken to stand where nothing says so."""
+    upright = isinstance(mapping, LatLongMap | CubeCross | CubeStrip)
+    return Orientation.PANORAMA if upright else Orientation.PROBE
 
 
 def _rows(environment: Environment, mapping: Mapping) -> int:

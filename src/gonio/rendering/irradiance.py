@@ -15,12 +15,12 @@ from ..arrays import Array, floats
 from ..directions import require_unit
 from ..errors import ArrayError
 from ..sphere.harmonics import degree_of, harmonics
-from ..sphere.zonal import clamped_cosine, zonal_product
+from ..sphere.zonal import clamped_cosine, convolve
 
 
 def irradiance_coefficients(light: Array) -> Array:
     """E_lm = A_l L_lm (RH 4.8): coefficients of the light ((degree + 1)^2, C) -> of the irradiance, same shape."""
-    return zonal_product(clamped_cosine(degree_of(light)), light)
+    return convolve(light, clamped_cosine(degree_of(light)))
 
 
 def irradiance(light: Array, n: Array) -> Array:
@@ -42,8 +42,9 @@ def irradiance_matrix(light: Array) -> Array:
     xp, L = floats(light)
     if L.ndim != 2 or L.shape[0] != 9:
         raise ArrayError(f"light has shape {tuple(L.shape)}; the matrix of RH 4.15 takes nine coefficients, (9, C).")
-    c1, c2, c3 = math.sqrt(15 / math.pi) * math.pi / 16, math.sqrt(math.pi / 3) / 2, math.sqrt(5 / math.pi) * 3 * math.pi / 16
-    c4, c5 = math.sqrt(math.pi) / 2, math.sqrt(5 / math.pi) * math.pi / 16
+    # A_l times the norms of the harmonics of RH 4.5, off-diagonal terms halved: .429043, .511664, .743125, ...
+    c1, c2 = math.sqrt(15 * math.pi) / 16, math.sqrt(math.pi / 3) / 2
+    c3, c4, c5 = 3 * math.sqrt(5 * math.pi) / 16, math.sqrt(math.pi) / 2, math.sqrt(5 * math.pi) / 16
     L00, L1m1, L10, L11, L2m2, L2m1, L20, L21, L22 = (L[k, :] for k in range(9))
     rows = (
         (c1 * L22, c1 * L2m2, c1 * L21, c2 * L11),

@@ -8,20 +8,22 @@ angle to R alone (Phong, RH 3.36). Lobes that change with the view need the maps
 
 from __future__ import annotations
 
+import warnings
+
 from ..arrays import Array, floats, like
 from ..errors import AccuracyWarning, ParameterError
 from ..lights.environment import Environment
 from ..lights.mappings import LatLongMap
 from ..sphere.grids import LatLong
 from ..sphere.transform import synthesis
-from ..sphere.zonal import zonal_product
+from ..sphere.zonal import convolve
 
 
 def degree_needed(A: Array, error: float) -> int:
     """The least degree beyond which abs(A_l) stays below `error` times A_0: where the series of a lobe may end."""
     if not 0 < error < 1:
         raise ParameterError(f"error = {error}; a relative error lies between 0 and 1.")
-    xp, A = floats(A)
+    _, A = floats(A)
     kept = [l for l in range(A.shape[0]) if abs(float(A[l])) >= error * abs(float(A[0]))]
     return max(kept, default=0)
 
@@ -33,8 +35,6 @@ def reflection_map(light: Environment, A: Array, rows: int, error: float = 0.01)
 
     Raises `ParameterError` where `rows` carries fewer degrees than that, or `A` ends before it.
     """
-    import warnings
-
     degree = degree_needed(A, error)
     grid = LatLong(rows, 2 * rows)
     if degree > grid.highest_degree:
@@ -47,5 +47,5 @@ def reflection_map(light: Environment, A: Array, rows: int, error: float = 0.01)
         )
     coefficients = light.harmonics(degree)
     xp, coefficients = floats(coefficients)
-    B = synthesis(zonal_product(like(A, coefficients)[: degree + 1], coefficients), grid)
+    B = synthesis(convolve(coefficients, like(A, coefficients)[: degree + 1]), grid)
     return Environment(xp.maximum(B, xp.zeros_like(B)), LatLongMap())

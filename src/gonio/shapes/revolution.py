@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import Array
+from ..directions import normalise
 from ..errors import ArrayError, ParameterError
 from .mesh import Mesh
 
@@ -41,32 +42,30 @@ def revolve(profile: Array, segments: int = 128) -> Mesh:
     u, v = np.meshgrid(np.arange(segments + 1) / segments, arc / arc[-1])
     # The outward normal in the (radius, height) plane is the profile's direction turned right.
     slope = np.gradient(profile, arc, axis=0)
-    normals = np.stack(
-        (
-            slope[:, 1, None] * np.cos(phi),
-            slope[:, 1, None] * np.sin(phi),
-            np.broadcast_to(-slope[:, :1], (len(profile), segments + 1)),
-        ),
-        axis=-1,
-    ).reshape(-1, 3)
-    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+    normals = normalise(_turned(slope[:, 1], -slope[:, 0], phi))
     row, column = np.divmod(np.arange((len(profile) - 1) * segments), segments)
     a = row * (segments + 1) + column
     b, c, d = a + 1, a + segments + 2, a + segments + 1
-    faces = np.concatenate((np.stack((a, b, c), axis=-1), np.stack((a, c, d), axis=-1)))
-    # On the axis one edge of a quad has no length, and one of its triangles no area.
-    corners = vertices[faces]
-    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=-1)
-    return Mesh(vertices, faces[area > 0], uv=np.stack((u.ravel(), v.ravel()), axis=-1), normals=normals)
+    # Where the profile meets the axis a ring is a point, and one triangle of each quad has no area.
+    wide = radius > 1e-9 * radius.max()
+    lower, upper = np.stack((a, b, c), axis=-1)[wide[row]], np.stack((a, c, d), axis=-1)[wide[row + 1]]
+    faces = np.concatenate((lower, upper))
+    return Mesh(vertices, faces, uv=np.stack((u.ravel(), v.ravel()), axis=-1), normals=normals)
+
+
+def _turned(radius: np.ndarray, height: np.ndarray, phi: np.ndarray) -> np.ndarray:
+    """The profile (K,), (K,) at each angle (S,): vectors (K S, 3)."""
+    x, y, z = np.broadcast_arrays(radius[:, None] * np.cos(phi), radius[:, None] * np.sin(phi), height[:, None])
+    return np.stack((x, y, z), axis=-1).reshape(-1, 3)
 
 
 def vase(segments: int = 256) -> Mesh:
     """The vase of the demo and the examples: about two units high, its foot at z = -1, made of a smooth profile."""
+    from scipy.interpolate import PchipInterpolator
+
     # Radius at heights from foot to lip, then a little way down inside; chosen to please.
     height = np.array([-1.0, -0.97, -0.85, -0.5, -0.1, 0.3, 0.6, 0.78, 0.92, 1.0])
     radius = np.array([0.34, 0.36, 0.40, 0.62, 0.72, 0.56, 0.32, 0.25, 0.30, 0.38])
-    from scipy.interpolate import PchipInterpolator
-
     z = np.linspace(-1.0, 1.0, 160)
     outside = np.stack((PchipInterpolator(height, radius)(z), z), axis=-1)
     lip = np.pi * np.linspace(0, 1, 9)[1:]

@@ -18,7 +18,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ..arrays import Array, floats, like, namespace, to_numpy
+from ..arrays import Array, floats, is_numpy, like, namespace, to_numpy
 from ..errors import AccuracyWarning, ArrayError, ParameterError
 from .harmonics import degree_of, degrees_and_orders, require_degree
 
@@ -37,6 +37,8 @@ def convolve(coefficients: Array, kernel: Array) -> Array:
         )
     if coefficients.ndim == 1 and kernel.ndim == 2:
         coefficients = coefficients[:, None]
+    if is_numpy(kernel):
+        kernel = like(kernel, coefficients)
     xp = namespace(coefficients, kernel)
     l = xp.asarray(degrees_and_orders(degree)[0], device=kernel.device)
     factor = xp.take(kernel, l, axis=0)
