@@ -2,9 +2,10 @@
 
     OMP_NUM_THREADS=1 python benchmarks/sphere.py [repetitions]
 
-Ours and each peer take turns, so that a busy machine slows all of them; medians are printed. The peers' recursions run
-in float64 and their maps in the dtype given, as ours do. They take one channel at a time, planar; ours takes the
-interleaved image as files hold it. The wheel of ducc0 is built for any x86-64; one compiled for this machine is faster.
+Ours and each peer take turns, so that a busy machine slows all of them; medians are printed. All recursions run in
+float64. With float32 maps ours also adds up over theta in float32, where ducc0 is the more exact: see the errors. Peers
+take one channel at a time, planar; ours takes the interleaved image as files hold it. pyshtools has float64 only,
+and a grid of its own, 2 (degree + 1) rows: it takes part where that is the size asked for, within a hundredth.
 The error is that of the coefficients after synthesis and analysis, relative rms; peers that are not installed are
 left out.
 """
@@ -120,6 +121,8 @@ def compare(degree: int, grid: gn.LatLong, dtype: type, repetitions: int) -> Non
     coefficients = np.random.default_rng(1).normal(size=((degree + 1) ** 2, 3)).astype(dtype)
     contenders: dict[str, Ours | Ducc | PySHTools] = {"gonio": Ours(coefficients, degree, grid)}
     for name, peer in (("ducc0", Ducc), ("pyshtools", PySHTools)):
+        if name == "pyshtools" and abs(2 * (degree + 1) - grid.rows) > grid.rows / 100:
+            continue
         try:
             contenders[name] = peer(coefficients, degree, grid)
         except ImportError:
