@@ -45,10 +45,10 @@ GOLD = Conductor([0.18, 0.54, 1.33], [3.43, 2.23, 1.87])
 
 MATERIALS: dict[str, BRDF] = {
     "Lambert, albedo .7 .65 .6": Lambert([0.70, 0.65, 0.60]),
-    "lacquer: Lambert + GGX .08": Lambert([0.45, 0.06, 0.05]) + Microfacet(GGX(0.08), Fresnel(1.5)),
+    "lacquer: Lambert + GGX .14": Lambert([0.45, 0.06, 0.05]) + Microfacet(GGX(0.14), Fresnel(1.5)),
     "satin: Lambert + GGX .35": Lambert([0.08, 0.16, 0.36]) + Microfacet(GGX(0.35), Fresnel(1.5)),
-    "gold, GGX .12": Microfacet(GGX(0.12), GOLD),
-    "brushed gold, GGX .08 x .4": Microfacet(GGX(0.08, 0.4), GOLD),
+    "gold, GGX .2": Microfacet(GGX(0.2), GOLD),
+    "brushed gold, GGX .1 x .4": Microfacet(GGX(0.1, 0.4), GOLD),
     "Ward, .3, alpha .1 x .3": Lambert([0.12, 0.22, 0.14]) + Ward(0.3, 0.1, 0.3),
 }
 
@@ -93,12 +93,12 @@ def _picture(folder: Path, name: str, image: np.ndarray, caption: str, exposure:
 
 def _hero(folder: Path, room: Environment) -> Section:
     camera = Pinhole.look_at(eye=(3.9, -4.6, 2.1), target=(0, 0, 0), field_of_view=22, size=(512, 512))
-    material = MATERIALS["lacquer: Lambert + GGX .08"]
-    image = render(vase(), material, room, camera, shadows=True, samples=192, supersample=2)
+    material = MATERIALS["lacquer: Lambert + GGX .14"]
+    image = render(vase(), material, room, camera, shadows=True, samples=256, supersample=2)
     write_image(folder / "vase.exr", image)
     picture = _picture(folder, "vase", image, "Red lacquer, with shadows.", 1.0)
     command = (
-        "gonio render --shape vase --shadows --brdf lambert:albedo=.45/.06/.05 --brdf ggx:alpha=.08,eta=1.5 -o vase.exr"
+        "gonio render --shape vase --shadows --brdf lambert:albedo=.45/.06/.05 --brdf ggx:alpha=.14,eta=1.5 -o vase.exr"
     )
     return Section(
         "A material under light",
@@ -110,11 +110,11 @@ def _hero(folder: Path, room: Environment) -> Section:
 
 
 def _materials(folder: Path, room: Environment) -> Section:
-    camera = Pinhole.look_at(eye=(3.2, -4.2, 1.4), target=(0, 0, 0), field_of_view=23, size=(200, 200))
+    camera = Pinhole.look_at(eye=(3.2, -4.2, 1.4), target=(0, 0, 0), field_of_view=23, size=(180, 180))
     pictures = []
     for k, (name, material) in enumerate(MATERIALS.items()):
-        image = render(Sphere(), material, room, camera, samples=512, supersample=2)
-        pictures.append(_picture(folder, f"material-{k}", image, name))
+        image = render(Sphere(), material, room, camera, samples=2048, supersample=2)
+        pictures.append(_picture(folder, f"material-{k}", image, name, 1.0))
     plot = Picture(lobes(folder / "lobes.png", MATERIALS), "Lobes of the six models, light from the left.")
     return Section(
         "Models of reflectance",
@@ -155,7 +155,7 @@ def _nine_numbers(folder: Path, room: Environment) -> Section:
                     shown("irradiance-nine", np.maximum(nine, 0) * scale, "The same from nine coefficients."),
                     shown("irradiance-error", 10 * np.abs(nine - exact) * scale, "Their difference, ten times."),
                 ),
-                330,
+                420,
             ),
             Table(
                 ("coefficient", "red", "green", "blue"),
