@@ -85,9 +85,8 @@ def spherical(w: Array) -> tuple[Array, Array]:
 def from_spherical(theta: Array, phi: Array) -> Array:
     """Unit directions (..., 3) at `theta` from +z and `phi` from +x towards +y, both in radians, broadcast."""
     xp, theta, phi = floats(theta, phi)
-    theta, phi = xp.broadcast_arrays(theta, phi)
     s = xp.sin(theta)
-    return xp.stack((s * xp.cos(phi), s * xp.sin(phi), xp.cos(theta)), axis=-1)
+    return xp.stack(xp.broadcast_arrays(s * xp.cos(phi), s * xp.sin(phi), xp.cos(theta)), axis=-1)
 
 
 def reflect(w: Array, n: Array | None = None) -> Array:

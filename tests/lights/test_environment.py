@@ -5,6 +5,7 @@ import pytest
 from reference import environment as reference
 
 import gonio as gn
+from gonio._kernels import environment as kernels
 from gonio.errors import ArrayError, DirectionError, ParameterError
 from gonio.frames import euler
 
@@ -45,6 +46,36 @@ def test_look_ups_of_a_lat_long_map_are_bilinear_across_its_edges(rng, direction
 def test_the_loops_and_the_array_code_look_up_alike(mapping, rows, rng, directions):
     e = gn.Environment(rng.random((*mapping.shape(rows), 3)), mapping)
     np.testing.assert_allclose(e.radiance(directions), e._radiance(directions), rtol=1e-11)
+    np.testing.assert_array_equal(e.nearest(directions), e._nearest(directions))
+
+
+@pytest.mark.parametrize(("mapping", "rows"), LAYOUTS)
+def test_look_ups_find_their_place_to_a_millionth_of_a_pixel(mapping, rows, directions):
+    # An atlas that holds its own columns and rows answers where it was looked up. The truth comes from NumPy's
+    # functions in double precision, whose rounding of some 1e-15 is 1e-11 of a pixel in maps of 8,192.
+    height, width = 64, 128
+    columns, row = np.meshgrid(np.arange(width + 2.0), np.arange(height + 2.0))
+    ruler = np.tile(np.stack((columns, row, 0 * row), axis=-1).reshape(-1, 3), (mapping.sheets, 1))
+    _, u, v = mapping.locate(np, directions)
+    out = np.empty((len(directions), 3))
+    layout = mapping.kernel, mapping.parameter
+    kernels.look_up(*layout, height, width, ruler, np.eye(3), directions, False, out)
+    np.testing.assert_allclose((out[:, 0] - 0.5) / width, u, atol=1e-6 / 8192)
+    np.testing.assert_allclose((out[:, 1] - 0.5) / height, v, atol=1e-6 / 8192)
+
+
+@pytest.mark.parametrize(("mapping", "rows"), LAYOUTS)
+def test_the_nearest_look_up_is_a_pixel_s_value_everywhere_within_it(mapping, rows, rng):
+    e = gn.Environment(rng.random((*mapping.shape(rows), 3)), mapping, O.GONIO.rotated(TURN))
+    height, width = mapping.sheet_shape(e.rows, e.columns)
+    pixels = e.image.reshape(-1, 3)
+    i, j = np.mgrid[:height, :width]
+    for offset in (np.array([0.5, 0.5]), *rng.uniform(0.01, 0.99, (5, 2))):
+        v, u = (i + offset[0]) / height, (j + offset[1]) / width
+        inside = mapping.density(u, v) > 0
+        for sheet, place in enumerate(mapping.placement(e.rows, e.columns)):
+            w = mapping.direct(sheet, u, v)[inside] @ e.turn.T
+            np.testing.assert_array_equal(e.nearest(w), pixels[place[inside]])
 
 
 @pytest.mark.parametrize(("mapping", "rows"), LAYOUTS)
@@ -132,6 +163,8 @@ def test_a_budget_keeps_the_energy_of_every_colour(mapping, rows, budget, rng):
     e = gn.Environment(rng.random((*mapping.shape(rows), 3)) ** 8, mapping)
     beams = e.beams(budget=budget)
     assert len(beams.directions) <= budget
+    if budget < np.count_nonzero(e.solid_angles):
+        assert e.beams(budget=budget) is beams  # not reckoned twice
     np.testing.assert_allclose(beams.irradiance.sum(0), e.beams().irradiance.sum(0), rtol=1e-12)
     np.testing.assert_allclose(np.linalg.norm(beams.directions, axis=-1), 1, rtol=1e-12)
 
@@ -278,6 +311,7 @@ def test_tensors_are_answered_in_kind_and_carry_gradients(rng, directions):
         np.testing.assert_allclose(seen.detach().numpy(), ours.radiance(directions), rtol=1e-10)
         np.testing.assert_allclose(theirs.harmonics(2).detach().numpy(), ours.harmonics(2), rtol=1e-9, atol=1e-12)
         np.testing.assert_allclose(theirs.beams().irradiance.detach().numpy(), ours.beams().irradiance, rtol=1e-12)
+        np.testing.assert_array_equal(theirs.nearest(torch.as_tensor(directions)).detach(), ours.nearest(directions))
         (seen.sum() + theirs.harmonics(1).sum()).backward()
         assert torch.isfinite(tensor.grad).all() and (tensor.grad != 0).any()
         single = gn.Environment(torch.tensor(values, dtype=torch.float32), mapping)
@@ -294,6 +328,7 @@ def test_tensors_are_answered_in_kind_and_carry_gradients(rng, directions):
         (lambda: gn.Environment(np.ones((4, 8)), gn.LatLongMap), ParameterError, "mapping such as"),
         (lambda: gn.Environment(np.ones((4, 4)), gn.AngularMap(), O.BLENDER), ParameterError, "BLENDER says nothing"),
         (lambda: room().radiance([0, 0, 2.0]), DirectionError, "length 2"),
+        (lambda: room().nearest([0, 0, 2.0]), DirectionError, "length 2"),
         (lambda: room().beams(budget=0), ParameterError, "budget"),
         (lambda: room().rotated(-np.eye(3)), DirectionError, "mirrors"),
         (lambda: room().harmonics(-1), ParameterError, "negative"),

@@ -65,6 +65,19 @@ def test_solid_angles_are_those_of_random_directions(mapping, rng):
     assert chi2 < usual.sum() + 5 * math.sqrt(2 * usual.sum())
 
 
+@pytest.mark.parametrize(("mapping", "rows"), [*WHOLE, (gn.MirrorBall(3.0), 32)], ids=lambda x: str(x)[:30])
+def test_a_pixel_s_solid_angle_is_the_integral_of_the_density(mapping, rows):
+    # Midpoints of 16 x 16 within each pixel meet smooth densities to 2e-3. Not at a rim, which cuts pixels.
+    height, width = mapping.sheet_shape(*mapping.shape(rows))
+    n = 16
+    y, x = (np.arange(height * n) + 0.5)[:, None] / (height * n), (np.arange(width * n) + 0.5) / (width * n)
+    far = np.hypot(2 * x - 1, 2 * y - 1).reshape(height, n, width, n).max(axis=(1, 3))
+    whole = far < 0.95 * getattr(mapping, "rim", math.inf)
+    sums = mapping.density(x, y).reshape(height, n, width, n).sum(axis=(1, 3))[whole]
+    solid = mapping.sheet_solid_angles(height, width)[whole]
+    np.testing.assert_allclose(sums / sums.sum(), solid / solid.sum(), rtol=2e-3)
+
+
 def test_a_lat_long_map_starts_at_the_zenith_and_at_phi_zero():
     w, _ = gn.LatLongMap().directions(256, 512)
     np.testing.assert_allclose(w[0, 0], [0, 0, 1], atol=0.01)

@@ -54,12 +54,16 @@ class _Cube(Mapping):
         sheet = sheet + xp.astype(~(signed > 0), xp.int64)
         return sheet, 0.5 + 0.5 * a, 0.5 - 0.5 * b
 
-    def direct(self, sheet: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:
-        a, b, one = 2 * u - 1, 1 - 2 * v, np.ones_like(u)
+    def direct(self, sheet: int, u: np.ndarray, v: np.ndarray) -> np.ndarray:
+        a, b, one = np.broadcast_arrays(2 * u - 1, 1 - 2 * v, 1.0)
         faces = ((one, b, -a), (-one, b, a), (a, one, -b), (a, -one, b), (a, b, one), (-a, b, -one))
-        w: np.ndarray = np.choose(sheet[..., None], [np.stack(face, axis=-1) for face in faces])
-        w /= np.sqrt(1 + a * a + b * b)[..., None]
+        w: np.ndarray = np.stack(faces[sheet], axis=-1) / np.sqrt(1 + a * a + b * b)[..., None]
         return w
+
+    def density(self, u: np.ndarray, v: np.ndarray) -> np.ndarray:
+        d2 = 1 + (2 * u - 1) ** 2 + (2 * v - 1) ** 2
+        density: np.ndarray = 1 / (d2 * np.sqrt(d2))
+        return density
 
     def sheet_solid_angles(self, height: int, width: int) -> np.ndarray:
         edge = np.linspace(-1.0, 1.0, width + 1)
@@ -80,12 +84,11 @@ class _Cube(Mapping):
                 (along, -0.5 / n, (slice(1, -1), 0)),
                 (along, 1 + 0.5 / n, (slice(1, -1), n + 1)),
             ):
-                beyond = self.direct(np.full(n, face), u + np.zeros(n), v + np.zeros(n))
-                out[face][where] = self._texel(beyond, n)
+                out[face][where] = self._texel(self.direct(face, np.asarray(u), np.asarray(v)), n)
             for corner, (v, u) in {
                 (0, 0): (0.0, 0.0), (0, n + 1): (0.0, 1.0), (n + 1, 0): (1.0, 0.0), (n + 1, n + 1): (1.0, 1.0),
             }.items():  # fmt: skip
-                x, y, z = self.direct(np.array(face), np.array(u), np.array(v)) > 0
+                x, y, z = self.direct(face, np.asarray(u), np.asarray(v)) > 0
                 out[face][corner] = 6 * n * n + 4 * int(x) + 2 * int(y) + int(z)
         return out
 

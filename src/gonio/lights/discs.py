@@ -120,12 +120,20 @@ class _Radial(_Disc):
         u = 0.5 + xp.where(side > 0, scale * w[..., 0], r)
         return xp.zeros(r.shape, dtype=xp.int64), u, 0.5 - scale * w[..., 1]
 
-    def direct(self, sheet: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:
+    def direct(self, sheet: int, u: np.ndarray, v: np.ndarray) -> np.ndarray:
         a, b = 2 * u - 1, 1 - 2 * v
         r = np.hypot(a, b)
         theta = self._theta(np.minimum(r, 1.0))
         s = np.sin(theta) / np.where(r > 0, r, 1.0)
         return np.stack((s * a, s * b, np.cos(theta)), axis=-1)
+
+    def density(self, u: np.ndarray, v: np.ndarray) -> np.ndarray:
+        r = np.hypot(2 * u - 1, 1 - 2 * v)
+        return np.where(r < 1, self._slope(np.minimum(r, 1.0)), 0.0)
+
+    def _slope(self, r: np.ndarray) -> np.ndarray:
+        """G'(r) / r for r in [0, 1], but for a constant factor."""
+        raise NotImplementedError
 
 
 @dataclasses.dataclass(frozen=True)
@@ -136,6 +144,10 @@ class AngularMap(_Radial):
 
     def _theta(self, r: np.ndarray) -> np.ndarray:
         return math.pi * r
+
+    def _slope(self, r: np.ndarray) -> np.ndarray:
+        slope: np.ndarray = np.sinc(r)
+        return slope
 
     def _radius(self, xp: Any, theta: Array) -> Array:
         return theta / math.pi
@@ -171,6 +183,18 @@ class MirrorBall(_Radial):
         alpha = np.arctan(r * math.tan(math.asin(self.parameter)))
         theta = 2 * np.arcsin(np.minimum(self.distance * np.sin(alpha), 1.0)) - alpha
         return theta
+
+    def _slope(self, r: np.ndarray) -> np.ndarray:
+        if math.isinf(self.distance):
+            return np.ones_like(r)
+        r = np.maximum(r, 1e-9)
+        tangent = math.tan(math.asin(self.parameter))
+        alpha = np.arctan(r * tangent)
+        sine = np.minimum(self.distance * np.sin(alpha), 1.0)
+        # d theta / d alpha, kept finite where the ray grazes the ball.
+        turning = 2 * self.distance * np.cos(alpha) / np.sqrt(np.maximum(1 - sine**2, 1e-12)) - 1
+        slope: np.ndarray = np.sin(self._theta(r)) * turning / (1 + (r * tangent) ** 2) / r
+        return slope
 
     def _radius(self, xp: Any, theta: Array) -> Array:
         if math.isinf(self.distance):
@@ -228,13 +252,17 @@ class DualParaboloid(_Disc):
         sheet = xp.where(front, xp.zeros(front.shape, dtype=xp.int64), xp.ones(front.shape, dtype=xp.int64))
         return sheet, 0.5 + scale * w[..., 0], 0.5 - scale * w[..., 1]
 
-    def direct(self, sheet: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:
+    def direct(self, sheet: int, u: np.ndarray, v: np.ndarray) -> np.ndarray:
         s, t = self.extent * (2 * u - 1), self.extent * (1 - 2 * v)
         beyond = np.maximum(np.hypot(s, t), 1.0)
         s, t = s / beyond, t / beyond
         r2 = s * s + t * t
         d = np.stack((2 * s, 2 * t, 1 - r2), axis=-1) / (1 + r2)[..., None]
-        return np.where((sheet == 0)[..., None], d, -d)
+        return d if sheet == 0 else -d
+
+    def density(self, u: np.ndarray, v: np.ndarray) -> np.ndarray:
+        r2 = self.extent**2 * ((2 * u - 1) ** 2 + (1 - 2 * v) ** 2)
+        return np.where(r2 < 1, 1 / (1 + r2) ** 2, 0.0)
 
     def _cap(self, r: np.ndarray) -> np.ndarray:
         r2 = (self.extent * r) ** 2

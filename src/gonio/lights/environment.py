@@ -8,7 +8,8 @@ that are exact for band-limited maps.
 
 Turning an environment turns its orientation and leaves the pixels alone. Not here: the layouts (`mappings.py`,
 `discs.py`, `cubes.py`), where pictures point by the tools' conventions (`orientation.py`), how a budget of beams is
-spent (`clusters.py`), and environments known by their harmonics alone (`harmonic.py`).
+spent (`clusters.py`), pictures in other layouts (`resampling.py`), and environments known by their harmonics alone
+(`harmonic.py`).
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ from .importance import Importance
 from .mappings import LatLongMap, Mapping
 from .model import Beams, Light
 from .orientation import Orientation
+from .resampling import averaged, moved
 
 # Directions in blocks of this many values where harmonics are summed pixel by pixel.
 _BLOCK = 4_000_000
@@ -120,31 +122,54 @@ class Environment(Light):
         """
         require_unit(w, "w")
         if is_numpy(w, self.image):
-            _, w = floats(w)
-            flat = np.ascontiguousarray(w.reshape(-1, 3))
-            out = np.empty((len(flat), self.image.shape[-1]), dtype=self.image.dtype)
-            kernels.look_up(*self._source, self.turn, flat, out)
-            return out.reshape(*w.shape[:-1], -1)
+            return self._look_up(floats(w)[1], self.turn)
         return self._radiance(w)
+
+    def nearest(self, w: Array) -> Array:
+        """Radiance (..., C) of the pixel in which each unit world direction `w` (..., 3) lies, not interpolated.
+
+        Raises `DirectionError` where w is not unit.
+        """
+        require_unit(w, "w")
+        if is_numpy(w, self.image):
+            return self._look_up(floats(w)[1], self.turn, nearest=True)
+        return self._nearest(w)
+
+    def _look_up(self, w: np.ndarray, turn: np.ndarray, nearest: bool = False) -> np.ndarray:
+        """By the loops: radiance (..., C) towards `w` (..., 3), whose direction in the layout's axes is turn^T w."""
+        height, width = self.mapping.sheet_shape(self.rows, self.columns)
+        flat = np.ascontiguousarray(w.reshape(-1, 3))
+        out = np.empty((len(flat), self.image.shape[-1]), dtype=to_numpy(self.image[:0]).dtype)
+        layout, texels = (self.mapping.kernel, self.mapping.parameter), to_numpy(self._atlas)
+        kernels.look_up(*layout, height, width, texels, turn, flat, nearest, out)
+        return out.reshape(*w.shape[:-1], -1)
 
     def _radiance(self, w: Array) -> Array:
         """`radiance` as array code."""
-        xp = namespace(self.image)
-        w = like(w, self.image)
+        xp, sheet, y, x, height, width = self._place(w)
+        i, j = (xp.clip(xp.astype(k + 0.5, xp.int64), 0, n) for k, n in ((y, height), (x, width)))
+        f, g = ((k + 0.5 - xp.astype(n, k.dtype))[..., None] for k, n in ((y, i), (x, j)))
+        at = (sheet * (height + 2) + i) * (width + 2) + j
+        top = self._texel(at) * (1 - g) + self._texel(at + 1) * g
+        bottom = self._texel(at + width + 2) * (1 - g) + self._texel(at + width + 3) * g
+        return top * (1 - f) + bottom * f
+
+    def _nearest(self, w: Array) -> Array:
+        """`nearest` as array code."""
+        xp, sheet, y, x, height, width = self._place(w)
+        i, j = (xp.clip(xp.astype(k, xp.int64), 0, n - 1) for k, n in ((y, height), (x, width)))
+        return self._texel((sheet * (height + 2) + i + 1) * (width + 2) + j + 1)
+
+    def _place(self, w: Array) -> tuple[Any, Array, Array, Array, int, int]:
+        """(namespace, sheet, row, column, rows, columns of a sheet), of world directions."""
+        xp, w = namespace(self.image), like(w, self.image)
         height, width = self.mapping.sheet_shape(self.rows, self.columns)
         sheet, u, v = self.mapping.locate(xp, w @ like(self.turn, w))
-        x, y = u * width + 0.5, v * height + 0.5
-        j = xp.clip(xp.astype(x, xp.int64), 0, width)
-        i = xp.clip(xp.astype(y, xp.int64), 0, height)
-        g, f = (x - xp.astype(j, x.dtype))[..., None], (y - xp.astype(i, y.dtype))[..., None]
-        at = (sheet * (height + 2) + i) * (width + 2) + j
+        return xp, sheet, v * height, u * width, height, width
 
-        def texel(k: Array) -> Array:
-            return xp.reshape(xp.take(self._atlas, xp.reshape(k, (-1,)), axis=0), (*k.shape, -1))
-
-        top = texel(at) * (1 - g) + texel(at + 1) * g
-        bottom = texel(at + width + 2) * (1 - g) + texel(at + width + 3) * g
-        return top * (1 - f) + bottom * f
+    def _texel(self, at: Array) -> Array:
+        xp = namespace(self.image)
+        return xp.reshape(xp.take(self._atlas, xp.reshape(at, (-1,)), axis=0), (*at.shape, -1))
 
     @cached_property
     def _atlas(self) -> Array:
@@ -166,12 +191,6 @@ class Environment(Light):
             flat = xp.concat((flat, xp.mean(meeting, axis=1)), axis=0)
         return xp.take(flat, index(self.mapping.ghosts(height, width)), axis=0)
 
-    @property
-    def _source(self) -> tuple[Any, ...]:
-        """What the kernels need to look up: the layout's number and parameter, a sheet's height and width, texels."""
-        height, width = self.mapping.sheet_shape(self.rows, self.columns)
-        return self.mapping.kernel, self.mapping.parameter, height, width, to_numpy(self._atlas)
-
     def beams(self, positions: Array | None = None, budget: int | None = None) -> Beams:
         """A beam for each pixel that shows anything, or at most `budget` of them (see `clusters.py`).
 
@@ -180,6 +199,8 @@ class Environment(Light):
         """
         if budget is not None and budget < 1:
             raise ParameterError(f"budget = {budget} is no number of beams; it is at least 1.")
+        if budget is not None and budget in self._clustered:
+            return self._clustered[budget]
         w, shown = self.directions()
         if budget is None or budget >= int(shown.sum()):
             at = np.flatnonzero(shown)
@@ -189,9 +210,17 @@ class Environment(Light):
             directions = like(w.reshape(-1, 3)[at], self.image)
             return Beams(directions, irradiance, xp.full_like(directions[:, 0], math.inf))
         energy = to_numpy(self.image) * self.solid_angles[..., None]
-        directions, irradiance = clusters(w, energy, budget)
-        directions, irradiance = like(directions, self.image), like(irradiance, self.image)
-        return Beams(directions, irradiance, namespace(self.image).full_like(directions[:, 0], math.inf))
+        directions, irradiance = (like(x, self.image) for x in clusters(w, energy, budget))
+        distance = namespace(directions).full_like(directions[:, 0], math.inf)
+        beams = Beams(*(frozen(x, x.dtype) for x in (directions, irradiance, distance)))
+        # Only the last budget is likely to be asked for again.
+        self.__dict__["_clustered"] = {budget: beams}
+        return beams
+
+    @cached_property
+    def _clustered(self) -> dict[int, Beams]:
+        """The beams of the last budget that was asked for."""
+        return {}
 
     @cached_property
     def _importance(self) -> Importance:
@@ -270,36 +299,12 @@ class Environment(Light):
         about 1e-3 (the bilinear look-up spreads a lone bright pixel of a polar row unevenly).
         """
         orientation = self.orientation if orientation is None else orientation
+        if mapping == self.mapping and rows == self.rows and orientation is self.orientation:
+            return self
         shape = mapping.shape(rows)
-        height, width = mapping.sheet_shape(*shape)
         turn = self.turn.T @ orientation.matrix(mapping)
-        moved = self._moved(mapping, shape, turn)
-        if moved is not None:
-            return Environment(like(moved, self.image), mapping, orientation)
-        solid = mapping.sheet_solid_angles(height, width)
-        finest = math.sqrt(float(np.max(self.solid_angles)))
-        samples = max(math.ceil(2 * math.sqrt(float(solid.max())) / finest - 1e-9), 2)
-        channels = self.image.shape[-1]
-        sheets = np.empty((mapping.sheets, height, width, channels), dtype=self._source[-1].dtype)
-        kernels.resample(*self._source, mapping.kernel, mapping.parameter, turn, samples, np.empty(channels), sheets)
-        image = np.zeros((shape[0] * shape[1], channels), dtype=sheets.dtype)
-        image[mapping.placement(*shape)] = np.where((solid > 0)[None, ..., None], sheets, 0)
-        return Environment(like(image.reshape(*shape, channels), self.image), mapping, orientation)
-
-    def _moved(self, mapping: Mapping, shape: tuple[int, int], turn: np.ndarray) -> np.ndarray | None:
-        """The pixels in their new places, where every new one covers exactly an old one; otherwise None."""
-        solid = mapping.solid_angles(*shape)
-        shown = solid > 0
-        if np.count_nonzero(shown) != np.count_nonzero(self.solid_angles):
-            return None
-        own, _ = mapping.directions(*shape)
-        at = np.stack(self.mapping.pixels(own[shown] @ turn.T, self.rows, self.columns))
-        row, column = np.clip(at.astype(np.int64), 0, [[self.rows - 1], [self.columns - 1]])
-        # Pixels cut by a rim stand for its nearest point, not for their centres.
-        whole = self.solid_angles[row, column] > 0.99 * np.median(self.solid_angles)
-        off = np.abs(at - 0.5 - [row, column])[:, whole | (self.mapping.sheets == 1)]
-        if np.max(off) > 1e-6 or not np.allclose(self.solid_angles[row, column], solid[shown], rtol=1e-6):
-            return None
-        pixels = np.zeros((*shape, self.image.shape[-1]), dtype=np.asarray(to_numpy(self.image)).dtype)
-        pixels[shown] = to_numpy(self.image)[row, column]
-        return pixels
+        image = moved(to_numpy(self.image), self.mapping, mapping, shape, turn)
+        if image is None:
+            finest = math.sqrt(float(np.max(self.solid_angles)))
+            image = averaged(lambda w: self._look_up(w, turn.T), mapping, shape, finest)
+        return Environment(like(image, self.image), mapping, orientation)

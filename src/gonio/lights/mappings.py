@@ -54,8 +54,12 @@ class Mapping(ABC):
         """(sheet, u, v) of own directions (..., 3): the sheet as integers, u and v in [0, 1]."""
 
     @abstractmethod
-    def direct(self, sheet: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:
+    def direct(self, sheet: int, u: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Own unit directions (..., 3) at (u, v) of a sheet: the inverse of `locate`. Outside a disc, its rim's."""
+
+    @abstractmethod
+    def density(self, u: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Solid angle per area of a sheet at (u, v), but for a constant factor; 0 outside a disc."""
 
     @abstractmethod
     def sheet_solid_angles(self, height: int, width: int) -> np.ndarray:
@@ -90,7 +94,7 @@ class Mapping(ABC):
         shown = self.sheet_solid_angles(height, width) > 0
         mask = np.zeros(rows * columns, dtype=bool)
         for sheet, at in enumerate(self.placement(rows, columns)):
-            w[at[shown]] = self.direct(np.full(int(shown.sum()), sheet), u[shown], v[shown])
+            w[at[shown]] = self.direct(sheet, u[shown], v[shown])
             mask[at[shown]] = True
         return w.reshape(rows, columns, 3), mask.reshape(rows, columns)
 
@@ -154,9 +158,13 @@ class LatLongMap(Mapping):
         theta, phi = spherical(w)
         return xp.zeros(phi.shape, dtype=xp.int64), phi / (2 * math.pi), theta / math.pi
 
-    def direct(self, sheet: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:
+    def direct(self, sheet: int, u: np.ndarray, v: np.ndarray) -> np.ndarray:
         w: np.ndarray = from_spherical(math.pi * v, 2 * math.pi * u)
         return w
+
+    def density(self, u: np.ndarray, v: np.ndarray) -> np.ndarray:
+        density: np.ndarray = np.sin(math.pi * v) * np.ones_like(u)
+        return density
 
     def sheet_solid_angles(self, height: int, width: int) -> np.ndarray:
         edge = np.arange(height) * (math.pi / height)
