@@ -12,11 +12,13 @@ from __future__ import annotations
 import numpy as np
 
 from .._kernels import wigner as kernel
-from ..arrays import Array, floats, is_numpy, like, to_numpy
+from ..arrays import Array, floats, is_numpy, like, namespace, to_numpy
 from ..errors import ArrayError, DirectionError
 from ..frames import euler_angles, require_rotation
 from .harmonics import complex_from_real, degree_of, real_from_complex
 from .wigner import quarter_turns, require_degree_of_d
+
+_FLOATS = (np.dtype(np.float32), np.dtype(np.float64))
 
 
 def rotate(coefficients: Array, rotation: Array) -> Array:
@@ -26,12 +28,14 @@ def rotate(coefficients: Array, rotation: Array) -> Array:
     `DirectionError` where `rotation` is no rotation, `ArrayError` where the coefficients are complex or their count
     is no square, `ParameterError` above degree 1500.
     """
-    xp, coefficients = floats(coefficients)
+    if not (isinstance(coefficients, np.ndarray) and coefficients.dtype in _FLOATS):  # `floats` asks for longer
+        _, coefficients = floats(coefficients)
     degree = degree_of(coefficients)
     require_degree_of_d(degree)
     if coefficients.ndim > 2:
         raise ArrayError(f"coefficients have shape {tuple(coefficients.shape)}: ((degree+1)^2,) or ((degree+1)^2, C).")
     if not is_numpy(coefficients):
+        xp = namespace(coefficients)
         precise = xp.astype(coefficients, xp.float64)
         return xp.astype(_by_quarter_turns(precise, degree, like(rotation, precise)), coefficients.dtype)
     R = np.ascontiguousarray(to_numpy(rotation), dtype=np.float64)
