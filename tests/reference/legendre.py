@@ -5,25 +5,25 @@ from math import comb, factorial
 import numpy as np
 
 
-def three_term(start, level, a, b, c, t):
-    """P_i(t) (steps, rings) of one order, from P_0 = start 2^(800 level) and P_{i+1} = (a t + b) P_i - c P_{i-1}."""
-    now, last = start * 2.0 ** (800.0 * level), np.zeros_like(start)
+def three_term(start, level, a, b, scale, t):
+    """scale_i P_i(t) (steps, rings) of one order: P_0 = start 2^(512 level), P_{i+1} = (a t + b) P_i - P_{i-1}."""
+    now, last = start * 2.0 ** (512.0 * level), np.zeros_like(start)
     table = []
     for i in range(a.size):
-        table.append(now)
-        now, last = (a[i] * t + b[i]) * now - c[i] * last, now
+        table.append(scale[i] * now)
+        now, last = (a[i] * t + b[i]) * now - last, now
     return np.array(table)
 
 
-def synthesise(coefficients, start, level, a, b, c, t):
+def synthesise(coefficients, start, level, a, b, scale, t):
     """sum_i coefficients[m, i, k] P_i(m, t_r), (orders, channels, rings)."""
-    tables = [three_term(start[m], level[m], a[m], b[m], c[m], t) for m in range(len(a))]
+    tables = [three_term(start[m], level[m], a[m], b[m], scale[m], t) for m in range(len(a))]
     return np.stack([coefficients[m].T @ table for m, table in enumerate(tables)])
 
 
-def analyse(rings, start, level, a, b, c, t):
+def analyse(rings, start, level, a, b, scale, t):
     """sum_r rings[m, k, r] P_i(m, t_r), (orders, steps, channels)."""
-    tables = [three_term(start[m], level[m], a[m], b[m], c[m], t) for m in range(len(a))]
+    tables = [three_term(start[m], level[m], a[m], b[m], scale[m], t) for m in range(len(a))]
     return np.stack([table @ rings[m].T for m, table in enumerate(tables)])
 
 

@@ -181,7 +181,7 @@ def test_gradients_flow_through_torch(rng):
 
 @pytest.mark.parametrize("recursion", [folded_recursion(LatLong(24, 48), 21), spin_recursion(LatLong(24, 48), 21, 2)])
 def test_kernels_agree_with_the_plain_recursion(recursion, rng):
-    parts = recursion.start, recursion.level, recursion.a, recursion.b, recursion.c, recursion.t
+    parts = recursion.start, recursion.level, recursion.a, recursion.b, recursion.scale, recursion.t
     orders, steps = recursion.a.shape
     f = rng.normal(size=(orders, steps, 8)) * (np.arange(steps)[None, :, None] < recursion.count[:, None, None])
     close(recursion.synthesise(f), plain.synthesise(f, *parts), atol=1e-12)

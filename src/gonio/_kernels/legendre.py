@@ -1,12 +1,15 @@
 """Sums over sequences that obey a three-term recursion, at many arguments at once: the inner loops of `sphere`.
 
-    P_0 = start 2^(800 level),   P_{i+1} = (a_i t + b_i) P_i - c_i P_{i-1}
-    synthesise   rings[m, k, r] = sum_i coefficients[m, i, k] P_i(m, t_r)
-    analyse      coefficients[m, i, k] = sum_r rings[m, k, r] P_i(m, t_r)
+    P_0 = start 2^(512 level),   P_{i+1} = (a_i t + b_i) P_i - P_{i-1}
+    synthesise   rings[m, k, r] = sum_i coefficients[m, i, k] scale[m, i] P_i(m, t_r)
+    analyse      coefficients[m, i, k] = sum_r rings[m, k, r] scale[m, i] P_i(m, t_r)
 
-Eight steps are taken for a block of rings that stays in the first cache, then used for every channel k. `level` < 0
-marks numbers below the range of a float64; they count as 0 until the recursion has lifted them to level 0. The
-recursion runs in float64, the sums in the dtype of the channels. Steps come in eights, channels in pairs.
+Eight steps are taken for a block of rings that stays in the first cache, then used for every channel k. The recursion
+runs in float64, the sums in the dtype of the channels. Steps come in eights, channels in pairs.
+
+`level` < 0 marks numbers too small to matter, below 2^-512 times what eight steps can add; they count as 0 until the
+recursion has lifted them to level 0. 2^512 is the root of a float64's range: at or above 2^-513 a number has 500 powers
+of two below it, and one below 1 has 2^1023 above it, where eight steps grow by less than (2^64)^8.
 """
 
 from __future__ import annotations
@@ -14,38 +17,40 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-BLOCK = 128  # rings: eight steps of them and the sums of a few channels fit a first cache of 32 KiB
+BLOCK = 128  # rings: eight steps of them and the sums of a dozen channels fit a first cache of 32 KiB
 EIGHT = 8
-_LIFT = 2.0**-800
+LANES = 32  # rings are taken in multiples of this, so that vectorised loops leave no remainder
+_LIFT = 2.0**-512
 
 # Sums may be reordered and fused so that they vectorise; NaN and infinity still spread as they should.
 _FAST = {"reassoc", "contract", "nsz"}
 
 
 @njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
-def _advance(steps, t, last, now, a, b, c, i, count):  # type: ignore[no-untyped-def]
+def _advance(steps, t, last, now, a, b, m, i, count):  # type: ignore[no-untyped-def]
     """P_i .. P_{i+7} into `steps`; `last` and `now` go from P_{i-1}, P_i to P_{i+7}, P_{i+8}."""
-    a0, a1, a2, a3, a4, a5, a6, a7 = a[i], a[i + 1], a[i + 2], a[i + 3], a[i + 4], a[i + 5], a[i + 6], a[i + 7]
-    b0, b1, b2, b3, b4, b5, b6, b7 = b[i], b[i + 1], b[i + 2], b[i + 3], b[i + 4], b[i + 5], b[i + 6], b[i + 7]
-    c0, c1, c2, c3, c4, c5, c6, c7 = c[i], c[i + 1], c[i + 2], c[i + 3], c[i + 4], c[i + 5], c[i + 6], c[i + 7]
+    a0, a1, a2, a3 = a[m, i], a[m, i + 1], a[m, i + 2], a[m, i + 3]
+    a4, a5, a6, a7 = a[m, i + 4], a[m, i + 5], a[m, i + 6], a[m, i + 7]
+    b0, b1, b2, b3 = b[m, i], b[m, i + 1], b[m, i + 2], b[m, i + 3]
+    b4, b5, b6, b7 = b[m, i + 4], b[m, i + 5], b[m, i + 6], b[m, i + 7]
     for r in range(count):
         u, v, x = last[r], now[r], t[r]
         steps[0, r] = v
-        u = (a0 * x + b0) * v - c0 * u
+        u = (a0 * x + b0) * v - u
         steps[1, r] = u
-        v = (a1 * x + b1) * u - c1 * v
+        v = (a1 * x + b1) * u - v
         steps[2, r] = v
-        u = (a2 * x + b2) * v - c2 * u
+        u = (a2 * x + b2) * v - u
         steps[3, r] = u
-        v = (a3 * x + b3) * u - c3 * v
+        v = (a3 * x + b3) * u - v
         steps[4, r] = v
-        u = (a4 * x + b4) * v - c4 * u
+        u = (a4 * x + b4) * v - u
         steps[5, r] = u
-        v = (a5 * x + b5) * u - c5 * v
+        v = (a5 * x + b5) * u - v
         steps[6, r] = v
-        u = (a6 * x + b6) * v - c6 * u
+        u = (a6 * x + b6) * v - u
         steps[7, r] = u
-        v = (a7 * x + b7) * u - c7 * v
+        v = (a7 * x + b7) * u - v
         last[r], now[r] = u, v
 
 
@@ -67,111 +72,130 @@ def _lift(steps, last, now, level, count):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
-def _accumulate(sums, steps, coefficients, i, count):  # type: ignore[no-untyped-def]
-    p0, p1, p2, p3, p4, p5, p6, p7 = steps[0], steps[1], steps[2], steps[3], steps[4], steps[5], steps[6], steps[7]
-    for k in range(sums.shape[0]):
-        row = sums[k]
-        f0, f1, f2, f3 = coefficients[i, k], coefficients[i + 1, k], coefficients[i + 2, k], coefficients[i + 3, k]
-        f4, f5, f6, f7 = coefficients[i + 4, k], coefficients[i + 5, k], coefficients[i + 6, k], coefficients[i + 7, k]
-        for r in range(count):
-            row[r] += (
-                f0 * p0[r] + f1 * p1[r] + f2 * p2[r] + f3 * p3[r] + f4 * p4[r] + f5 * p5[r] + f6 * p6[r] + f7 * p7[r]
-            )
+def _accumulate(sums, steps, weights, i, count):  # type: ignore[no-untyped-def]
+    for k in range(0, sums.shape[0], 2):
+        for j in range(0, EIGHT, 4):
+            f0, f1, f2, f3 = weights[k, i + j], weights[k, i + j + 1], weights[k, i + j + 2], weights[k, i + j + 3]
+            n = k + 1
+            g0, g1, g2, g3 = weights[n, i + j], weights[n, i + j + 1], weights[n, i + j + 2], weights[n, i + j + 3]
+            for r in range(count):
+                p0, p1, p2, p3 = steps[j, r], steps[j + 1, r], steps[j + 2, r], steps[j + 3, r]
+                sums[k, r] += f0 * p0 + f1 * p1 + f2 * p2 + f3 * p3
+                sums[n, r] += g0 * p0 + g1 * p1 + g2 * p2 + g3 * p3
 
 
 @njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
-def _project(coefficients, steps, values, i, count, zero):  # type: ignore[no-untyped-def]
+def _project(weights, steps, values, i, count, zero):  # type: ignore[no-untyped-def]
     for k in range(0, values.shape[0], 2):
-        x, y = values[k], values[k + 1]
+        n = k + 1
         for j in range(0, EIGHT, 4):
-            p0, p1, p2, p3 = steps[j], steps[j + 1], steps[j + 2], steps[j + 3]
             x0, x1, x2, x3 = zero, zero, zero, zero
             y0, y1, y2, y3 = zero, zero, zero, zero
             for r in range(count):
-                x0 += p0[r] * x[r]
-                x1 += p1[r] * x[r]
-                x2 += p2[r] * x[r]
-                x3 += p3[r] * x[r]
-                y0 += p0[r] * y[r]
-                y1 += p1[r] * y[r]
-                y2 += p2[r] * y[r]
-                y3 += p3[r] * y[r]
-            coefficients[i + j, k] += x0
-            coefficients[i + j + 1, k] += x1
-            coefficients[i + j + 2, k] += x2
-            coefficients[i + j + 3, k] += x3
-            coefficients[i + j, k + 1] += y0
-            coefficients[i + j + 1, k + 1] += y1
-            coefficients[i + j + 2, k + 1] += y2
-            coefficients[i + j + 3, k + 1] += y3
+                p0, p1, p2, p3 = steps[j, r], steps[j + 1, r], steps[j + 2, r], steps[j + 3, r]
+                x, y = values[k, r], values[n, r]
+                x0 += p0 * x
+                x1 += p1 * x
+                x2 += p2 * x
+                x3 += p3 * x
+                y0 += p0 * y
+                y1 += p1 * y
+                y2 += p2 * y
+                y3 += p3 * y
+            weights[k, i + j] += x0
+            weights[k, i + j + 1] += x1
+            weights[k, i + j + 2] += x2
+            weights[k, i + j + 3] += x3
+            weights[n, i + j] += y0
+            weights[n, i + j + 1] += y1
+            weights[n, i + j + 2] += y2
+            weights[n, i + j + 3] += y3
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def synthesise(coefficients, start, level, a, b, c, count, first, stop, t, rings):  # type: ignore[no-untyped-def]
+def _begin(start, level, t, m, low, count, ring):  # type: ignore[no-untyped-def]
+    """Set ring = (t, last, now, level) for `count` rings from `low`; those beyond the last are 0. How many in range."""
+    x, last, now, deep = ring
+    ready = 0
+    for r in range(count):
+        inside = low + r < t.size
+        last[r] = 0.0
+        x[r], now[r], deep[r] = (t[low + r], start[m, low + r], level[m, low + r]) if inside else (0.0, 0.0, 0)
+        if deep[r] >= 0:
+            ready += 1
+    return ready
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def synthesise(coefficients, start, level, a, b, scale, count, first, stop, t, rings):  # type: ignore[no-untyped-def]
     """Fill `rings` (orders, channels, rings) from `coefficients` (orders, steps, channels), of one dtype.
 
-    start, level: (orders, rings). a, b, c: (orders, steps). count, first, stop: (orders,): steps of each order, and
-    its range of rings; the others become 0. t: (rings,).
+    start, level: (orders, rings). a, b, scale: (orders, steps). count, first, stop: (orders,): steps of each order, and
+    its range of rings; the others become 0. t: (rings,); `rings` may be longer.
     """
     channels = rings.shape[1]
     steps = np.empty((EIGHT, BLOCK), rings.dtype)
     sums = np.empty((channels, BLOCK), rings.dtype)
-    last, now, deep = np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK, np.int64)
+    weights = np.empty((channels, a.shape[1]), rings.dtype)
+    x, last, now, deep = np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK, np.int64)
     for m in range(rings.shape[0]):
-        rings[m, :, : first[m]] = 0
+        for i in range(a.shape[1]):
+            for k in range(channels):
+                weights[k, i] = coefficients[m, i, k] * scale[m, i]
+        begin = first[m] // LANES * LANES
+        rings[m, :, :begin] = 0
         rings[m, :, stop[m] :] = 0
-        for low in range(first[m], stop[m], BLOCK):
+        for low in range(begin, stop[m], BLOCK):
             n = min(BLOCK, stop[m] - low)
-            ready = 0
-            for r in range(n):
-                last[r], now[r], deep[r] = 0.0, start[m, low + r], level[m, low + r]
-                if deep[r] >= 0:
-                    ready += 1
-            sums[:, :n] = 0
+            whole = (n + LANES - 1) // LANES * LANES
+            ready = _begin(start, level, t, m, low, whole, (x, last, now, deep))
+            sums[:, :whole] = 0
             for i in range(0, count[m], EIGHT):
-                _advance(steps, t[low : low + n], last, now, a[m], b[m], c[m], i, n)
+                _advance(steps, x, last, now, a, b, m, i, whole)
                 before = ready
-                if ready < n:
-                    ready = _lift(steps, last, now, deep, n)
+                if ready < whole:
+                    ready = _lift(steps, last, now, deep, whole)
                 if before > 0:
-                    _accumulate(sums, steps, coefficients[m], i, n)
+                    _accumulate(sums, steps, weights, i, whole)
             rings[m, :, low : low + n] = sums[:, :n]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def analyse(rings, start, level, a, b, c, count, first, stop, t, coefficients):  # type: ignore[no-untyped-def]
+def analyse(rings, start, level, a, b, scale, count, first, stop, t, coefficients):  # type: ignore[no-untyped-def]
     """Fill `coefficients` (orders, steps, channels) from `rings` (orders, channels, rings): `synthesise` transposed."""
     channels = rings.shape[1]
     steps = np.empty((EIGHT, BLOCK), rings.dtype)
     values = np.empty((channels, BLOCK), rings.dtype)
-    last, now, deep = np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK, np.int64)
+    weights = np.empty((channels, a.shape[1]), rings.dtype)
+    x, last, now, deep = np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK, np.int64)
     zero = rings.dtype.type(0)
     for m in range(rings.shape[0]):
-        coefficients[m] = 0
-        for low in range(first[m], stop[m], BLOCK):
+        weights[:] = 0
+        for low in range(first[m] // LANES * LANES, stop[m], BLOCK):
             n = min(BLOCK, stop[m] - low)
-            ready = 0
-            for r in range(n):
-                last[r], now[r], deep[r] = 0.0, start[m, low + r], level[m, low + r]
-                if deep[r] >= 0:
-                    ready += 1
+            whole = (n + LANES - 1) // LANES * LANES
+            ready = _begin(start, level, t, m, low, whole, (x, last, now, deep))
             values[:, :n] = rings[m, :, low : low + n]
+            values[:, n:whole] = 0
             for i in range(0, count[m], EIGHT):
-                _advance(steps, t[low : low + n], last, now, a[m], b[m], c[m], i, n)
+                _advance(steps, x, last, now, a, b, m, i, whole)
                 before = ready
-                if ready < n:
-                    ready = _lift(steps, last, now, deep, n)
+                if ready < whole:
+                    ready = _lift(steps, last, now, deep, whole)
                 if before > 0:
-                    _project(coefficients[m], steps, values, i, n, zero)
+                    _project(weights, steps, values, i, whole, zero)
+        for i in range(a.shape[1]):
+            for k in range(channels):
+                coefficients[m, i, k] = weights[k, i] * scale[m, i]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def tabulate(start, level, a, b, c, t, table):  # type: ignore[no-untyped-def]
-    """Fill `table` (steps, rings) with P_i(t_r) of one order: start, level, t (rings,), a, b, c (steps,)."""
+def tabulate(start, level, a, b, scale, t, table):  # type: ignore[no-untyped-def]
+    """Fill `table` (steps, rings) with scale_i P_i(t_r) of one order: start, level, t (rings,), a, b, scale (steps,)."""
     for r in range(t.size):
         last, now, deep = 0.0, start[r], level[r]
         for i in range(table.shape[0]):
-            table[i, r] = now if deep >= 0 else 0.0
-            last, now = now, (a[i] * t[r] + b[i]) * now - c[i] * last
+            table[i, r] = scale[i] * now if deep >= 0 else 0.0
+            last, now = now, (a[i] * t[r] + b[i]) * now - last
             if deep < 0 and abs(now) > 1:
                 last, now, deep = last * _LIFT, now * _LIFT, deep + 1

@@ -1,5 +1,5 @@
-"""The real transforms of NumPy arrays, by the kernels: the rows in pieces, then the sums over theta a few orders at a
-time, so that what lies between the steps stays in the cache.
+"""The real transforms of NumPy arrays, by the kernels: Fourier sums over pairs of rows, then the sums over theta a few
+orders at a time, so that what lies between the steps stays in the cache.
 
 The same steps as array code, for other libraries, stand in `folding.py`, `packing.py` and `transform.py`.
 """
@@ -11,64 +11,56 @@ from collections.abc import Iterator
 import numpy as np
 
 from .._kernels import packing as kernels
-from .azimuth import turns
+from . import row_pairs
 from .grids import Grid
 from .legendre import folded_recursion, odd_factors
-from .quadrature import weighted
+from .packing import root_two
+from .quadrature import mend
 
-_PIECE = 2**19  # bytes taken at once: of values by the Fourier transform, of rings by the sums over theta
+_PIECE = 2**19  # bytes of rings that the sums over theta take at once
 
 
 def analyse(values: np.ndarray, grid: Grid, degree: int) -> np.ndarray:
     """((degree + 1)^2, C) from values (rows, columns, C)."""
-    from scipy.fft import rfft
-
-    channels, kind = values.shape[2], _complex_kind(values.dtype)
-    waves = np.empty((grid.rows, degree + 1, channels), kind)
-    for rows in _pieces(grid.rows, values[0].nbytes):
-        waves[rows] = rfft(values[rows], axis=1)[:, : degree + 1]
+    channels = values.shape[2]
+    way = row_pairs.way(grid, degree)
+    rings = way.analyse(values, _weights(grid).astype(values.dtype))
     recursion = folded_recursion(grid, degree)
     factors = odd_factors(degree, recursion.a.shape[1])
-    turn = turns(degree, grid.columns, -1).astype(kind)
+    turn = _kind(way.turn(1) * root_two(degree), values.dtype)
     coefficients = np.empty(((degree + 1) ** 2, channels), values.dtype)
-    for orders in _orders(degree, 4 * channels * recursion.t.size * values.itemsize):
-        rings = np.empty((orders.stop - orders.start, 4 * channels, recursion.t.size), values.dtype)
-        kernels.fold(waves, turn, orders.start, rings)
-        weighted(rings[:, : 2 * channels], grid, degree, 0, 0)
-        weighted(rings[:, 2 * channels :], grid, degree, 0, 1)
-        kernels.unpack(recursion.analyse(rings, orders), degree, *factors, orders.start, coefficients)
+    for orders in _orders(degree, rings[0].nbytes):
+        mend(rings[orders, :, : recursion.t.size], grid, degree)
+        kernels.unpack(recursion.analyse(rings[orders], orders), degree, *factors, turn, orders.start, coefficients)
     return coefficients
 
 
 def synthesise(coefficients: np.ndarray, grid: Grid, degree: int) -> np.ndarray:
     """Values (rows, columns, C) from coefficients ((degree + 1)^2, C)."""
-    from scipy.fft import irfft
-
-    channels, kind = coefficients.shape[1], _complex_kind(coefficients.dtype)
+    channels = coefficients.shape[1]
+    way = row_pairs.way(grid, degree)
     recursion = folded_recursion(grid, degree)
     factors = odd_factors(degree, recursion.a.shape[1])
-    cosines = np.cos(grid.theta[: recursion.t.size]).astype(coefficients.dtype)
-    # irfft counts every m > 0 twice.
-    turn = (turns(degree, grid.columns, 1) * np.where(np.arange(degree + 1) > 0, 0.5, 1)).astype(kind)
-    waves = np.empty((grid.rows, degree + 1, channels), kind)
-    for orders in _orders(degree, 4 * channels * recursion.t.size * coefficients.itemsize):
+    turn = _kind(way.turn(-1) * root_two(degree), coefficients.dtype)
+    rings = row_pairs.empty_rings(grid, degree, channels, coefficients.dtype)
+    for orders in _orders(degree, rings[0].nbytes):
         packed = np.empty((orders.stop - orders.start, recursion.a.shape[1], 4 * channels), coefficients.dtype)
-        kernels.pack(coefficients, degree, *factors, orders.start, packed)
-        kernels.unfold(recursion.synthesise(packed, orders), turn, cosines, orders.start, waves)
-    values = np.empty((grid.rows, grid.columns, channels), coefficients.dtype)
-    for rows in _pieces(grid.rows, values[0].nbytes):
-        values[rows] = irfft(waves[rows], n=grid.columns, axis=1, norm="forward")
-    return values
+        kernels.pack(coefficients, degree, *factors, turn, orders.start, packed)
+        recursion.synthesise(packed, orders, rings[orders])
+    return way.synthesise(rings, np.cos(grid.theta[: recursion.t.size]).astype(rings.dtype))
 
 
-def _complex_kind(dtype: np.dtype) -> type[np.complexfloating]:
-    return np.complex64 if dtype == np.float32 else np.complex128
+def _weights(grid: Grid) -> np.ndarray:
+    """Weights (2, pairs) of the sums and, times cos theta, of the differences; the equator comes twice."""
+    pairs = (grid.rows + 1) // 2
+    weights = grid.weights[:pairs] * np.stack((np.ones(pairs), np.cos(grid.theta[:pairs])))
+    if grid.rows % 2:
+        weights[:, -1] /= 2
+    return weights
 
 
-def _pieces(rows: int, size: int) -> Iterator[slice]:
-    """Slices that cover `rows` rows of `size` bytes each, about `_PIECE` bytes a slice."""
-    step = max(1, _PIECE // size)
-    return (slice(low, min(low + step, rows)) for low in range(0, rows, step))
+def _kind(turn: np.ndarray, dtype: np.dtype) -> np.ndarray:
+    return turn.astype(np.complex64 if dtype == np.float32 else np.complex128)
 
 
 def _orders(degree: int, size: int) -> Iterator[slice]:

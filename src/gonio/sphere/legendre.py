@@ -7,6 +7,9 @@
 starting at l = max(m, abs(s)) with a product of powers of cos and sin of theta/2. Only m >= 0 is needed: the functions
 at -m are those at m seen from the other pole, d^l_{-m,-s}(theta) = (-1)^(l+s) d^l_{m,-s}(pi - theta).
 
+The kernels are spared a product a step: with lambda_i = scale_i P_i and scale_{i+1} g_i = scale_{i-1} g_{i-1} the last
+term becomes P_{i-1} itself. Since g grows towards 1/2, every scale lies between g of the first step and 2.
+
 Without spin two steps make one in cos^2 theta, on the northern rings alone: the even l - m are symmetric about the
 equator, and the odd ones are cos theta times a sum over the even ones (Ishioka 2018, "A new recurrence formula for
 efficient computation of spherical harmonic transform"; the way of libsharp and ducc).
@@ -24,7 +27,8 @@ import numpy as np
 from .._kernels import legendre as kernels
 from .grids import Grid
 
-_LEVEL = 800  # a number is start 2^(_LEVEL level), as in the kernels
+_LEVEL = 512  # a number is start 2^(_LEVEL level), as in the kernels
+_NEGLIGIBLE = 54.0  # exp(-54) = 4e-24: beside it a norm of up to sqrt(degree) and the like has no say
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -35,15 +39,18 @@ class Recursion:
     level: np.ndarray  # (orders, rings), 0 or less
     a: np.ndarray  # (orders, steps), steps padded to eights with zeros
     b: np.ndarray
-    c: np.ndarray
+    scale: np.ndarray
     count: np.ndarray  # (orders,): steps that are not padding
     first: np.ndarray  # (orders,): the rings first..stop are not negligible
     stop: np.ndarray
     t: np.ndarray  # (rings,): the argument, cos theta or its square
 
-    def synthesise(self, coefficients: np.ndarray, orders: slice = slice(None)) -> np.ndarray:
-        """(orders, steps, channels) -> (orders, channels, rings), for all orders or some."""
-        rings = np.empty((coefficients.shape[0], coefficients.shape[2], self.t.size), coefficients.dtype)
+    def synthesise(
+        self, coefficients: np.ndarray, orders: slice = slice(None), rings: np.ndarray | None = None
+    ) -> np.ndarray:
+        """(orders, steps, channels) -> (orders, channels, rings), for all orders or some, into `rings` where given."""
+        if rings is None:
+            rings = np.empty((coefficients.shape[0], coefficients.shape[2], self.t.size), coefficients.dtype)
         kernels.synthesise(coefficients, *self._arguments(orders), rings)
         return rings
 
@@ -56,12 +63,12 @@ class Recursion:
     def table(self, m: int) -> np.ndarray:
         """The functions of order `m`, (steps, rings), in float64; the padding is 0."""
         table = np.empty((self.a.shape[1], self.t.size))
-        kernels.tabulate(self.start[m], self.level[m], self.a[m], self.b[m], self.c[m], self.t, table)
+        kernels.tabulate(self.start[m], self.level[m], self.a[m], self.b[m], self.scale[m], self.t, table)
         table[self.count[m] :] = 0
         return table
 
     def _arguments(self, orders: slice) -> tuple[np.ndarray, ...]:
-        fields = (self.start, self.level, self.a, self.b, self.c, self.count, self.first, self.stop)
+        fields = (self.start, self.level, self.a, self.b, self.scale, self.count, self.first, self.stop)
         return *(x[orders] for x in fields), self.t
 
 
@@ -69,9 +76,8 @@ class Recursion:
 def spin_recursion(grid: Grid, degree: int, spin: int) -> Recursion:
     """lambda_lm at all rows of `grid`, one step for each l from max(m, abs(spin)) to `degree`."""
     m, l = _steps(degree, spin)
-    g, before = _coupling(l, m, spin), _coupling(l - 1, m, spin)
     centre = -m * spin / np.maximum(l * (l + 1), 1)
-    return _recursion(grid.theta, degree, spin, l, (1 / g, -centre / g, before / g), np.cos(grid.theta))
+    return _recursion(grid.theta, degree, spin, l, _coupling(l, m, spin), centre, np.cos(grid.theta))
 
 
 @lru_cache(maxsize=8)
@@ -79,11 +85,10 @@ def folded_recursion(grid: Grid, degree: int) -> Recursion:
     """(-1)^m lambda_lm (no Condon-Shortley sign) for l = m, m + 2, ..., at the northern rows and the equator."""
     m, l = _steps(degree, 0)
     l = m + 2 * (l - m)[:, : degree // 2 + 1]
-    gg = _coupling(l, m, 0) * _coupling(l + 1, m, 0)
-    back = _coupling(l - 1, m, 0)
-    factors = (1 / gg, -(_coupling(l, m, 0) ** 2 + back**2) / gg, _coupling(l - 2, m, 0) * back / gg)
+    g = _coupling(l, m, 0)
     theta = grid.theta[: (grid.rows + 1) // 2]
-    return _recursion(theta, degree, 0, l, factors, np.cos(theta) ** 2, sign=False)
+    centre = g**2 + _coupling(l - 1, m, 0) ** 2
+    return _recursion(theta, degree, 0, l, g * _coupling(l + 1, m, 0), centre, np.cos(theta) ** 2, sign=False)
 
 
 @lru_cache(maxsize=8)
@@ -116,27 +121,32 @@ def _recursion(
     degree: int,
     spin: int,
     l: np.ndarray,
-    factors: tuple[np.ndarray, ...],
+    g: np.ndarray,
+    centre: np.ndarray,
     t: np.ndarray,
     sign: bool = True,
 ) -> Recursion:
+    """g_i lambda_{i+1} = (t - centre_i) lambda_i - g_{i-1} lambda_{i-1}; degrees, g and centre are (orders, steps)."""
     inside = l <= degree
-    steps = -(-l.shape[1] // kernels.EIGHT) * kernels.EIGHT
-    padded = []
-    for factor in factors:
-        values = np.zeros((degree + 1, steps))
-        values[:, : l.shape[1]] = np.where(inside, factor, 0)
-        padded.append(values)
+    scale = np.ones_like(g)
+    for i in range(2, g.shape[1]):
+        scale[:, i] = scale[:, i - 2] * g[:, i - 2] / g[:, i - 1]
+    a = scale / g
+    a[:, :-1] /= scale[:, 1:]
+    shape = degree + 1, -(-l.shape[1] // kernels.EIGHT) * kernels.EIGHT
+    factors = []
+    for factor in (a, -centre * a, scale):
+        padded = np.zeros(shape)
+        padded[:, : l.shape[1]] = np.where(inside, factor, 0)
+        factors.append(padded)
     start, level = _start(theta, degree, spin, sign)
-    first, stop = _range(theta, degree, spin)
-    a, b, c = padded
-    return Recursion(start, level, a, b, c, inside.sum(axis=1), first, stop, t)
+    return Recursion(start, level, *factors, inside.sum(axis=1), *_range(theta, degree, spin), t)
 
 
 def _start(theta: np.ndarray, degree: int, spin: int, sign: bool) -> tuple[np.ndarray, np.ndarray]:
     """lambda at l = max(m, abs(s)) for m = 0..degree: sqrt((2l + 1)/(4 pi) binomial(2l, p)) cos^p sin^q of theta/2.
 
-    p = abs(m - s), q = abs(m + s). As start 2^(800 level) with start in (2^-801, 1].
+    p = abs(m - s), q = abs(m + s). As start 2^(512 level) with start in (2^-513, 1].
     """
     highest = degree + abs(spin)
     cosine, sine = _powers(np.cos(theta / 2), highest), _powers(np.sin(theta / 2), highest)
@@ -164,13 +174,18 @@ def _powers(x: np.ndarray, highest: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _range(theta: np.ndarray, degree: int, spin: int) -> tuple[np.ndarray, np.ndarray]:
-    """For each order the rings first..stop where lambda is not negligible.
+    """For each order the rings first..stop where lambda is not negligible: what is left out is below 1e-20.
 
-    lambda_lm lives where l^2 sin^2 theta > m^2 + s^2 - 2 m abs(s cos theta) and dies like a power m - l sin theta
-    towards the poles; the margin of 100 is libsharp's and leaves less than 1e-20.
+    With y = log tan(theta / 2) the functions obey lambda'' = (n^2 - x^2) lambda, n^2 = m^2 + s^2 - 2 m s cos theta,
+    x = (l + 1/2) sin theta (its 1/4 sin^2 theta set aside), so that towards a pole, where x < n, they die at least as
+    exp(-S), S = integral of sqrt(n^2 - x^2) dy from here to where x = n. Since dy = dx / (x cos theta) >= dx / x, and
+    n grows on the way if abs(cos theta) is taken for its worse sign, S is at least the same integral over dx / x:
+
+        n artanh(w / n) - w,  w = sqrt(n^2 - x^2)        (Debye's exponent of the Bessel function J_n(x))
     """
     m = np.arange(degree + 1)[:, None]
-    reach = degree * np.sin(theta) + max(100.0, 0.01 * degree)
-    lives = m * m + spin * spin - 2 * m * abs(spin) * np.abs(np.cos(theta)) <= reach * reach
+    n = np.sqrt(m * m + spin * spin - 2 * m * abs(spin) * np.abs(np.cos(theta)))
+    w = np.sqrt(np.maximum(n * n - ((degree + 0.5) * np.sin(theta)) ** 2, 0))
+    lives = n * np.arctanh(w / np.maximum(n, 1)) - w <= _NEGLIGIBLE
     lives[:, -1] |= ~lives.any(axis=1)  # never an empty range
     return np.argmax(lives, axis=1), theta.size - np.argmax(lives[:, ::-1], axis=1)

@@ -37,7 +37,7 @@ def pack(flat: Array, degree: int) -> Array:
     """Coefficients in the real harmonics, packed."""
     xp = namespace(flat)
     places = _folded_places(degree)
-    packed = _taken(flat, places.flat).reshape(*places.flat.shape[:2], -1) * _root_two(degree, flat)
+    packed = _taken(flat, places.flat).reshape(*places.flat.shape[:2], -1) * like(root_two(degree), flat)[:, None, None]
     half = 2 * flat.shape[1]
     inverse, coupling = (like(x, flat)[..., None] for x in odd_factors(degree, packed.shape[1]))
     odd: list[Array] = []
@@ -56,7 +56,9 @@ def unpack(packed: Array, degree: int) -> Array:
     for i in range(packed.shape[1]):
         total = packed[:, i, half:]
         odd.append(inverse[i] * (total - coupling[i - 1] * odd[-1] if odd else total))
-    packed = xp.concat((packed[..., :half], xp.stack(odd, axis=1)), axis=-1) * _root_two(degree, packed)
+    packed = (
+        xp.concat((packed[..., :half], xp.stack(odd, axis=1)), axis=-1) * like(root_two(degree), packed)[:, None, None]
+    )
     return xp.take(packed.reshape(-1, half // 2), _indices(_folded_places(degree).packed, packed), axis=0)
 
 
@@ -91,11 +93,9 @@ def _indices(places: np.ndarray, reference: Array) -> Array:
     return namespace(reference).asarray(places.ravel(), device=reference.device)
 
 
-def _root_two(degree: int, reference: Array) -> Array:
-    """The norm of the real harmonics beside the complex ones: 1 at m = 0, else sqrt2; (orders, 1, 1)."""
-    root = np.full((degree + 1, 1, 1), math.sqrt(2))
-    root[0] = 1
-    return like(root, namespace(reference).real(reference))
+def root_two(degree: int) -> np.ndarray:
+    """The norm of the real harmonics beside the complex ones: 1 at m = 0, else sqrt2; (orders,)."""
+    return np.where(np.arange(degree + 1) > 0, math.sqrt(2), 1.0)
 
 
 @lru_cache(maxsize=8)

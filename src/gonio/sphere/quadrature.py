@@ -18,7 +18,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from ..arrays import Array, is_numpy, like, namespace
+from ..arrays import Array, like, namespace
 from .grids import Grid, LatLong
 
 
@@ -26,36 +26,46 @@ def weighted(rings: Array, grid: Grid, degree: int, spin: int, symmetry: int | N
     """Rings f (orders, channels, rows) so weighted that their sums against functions to `degree` are integrals.
 
     With `symmetry` None the rings are all rows; with 0 the sums of the northern rows and their mirror images, with 1
-    the differences, which come out times cos theta. NumPy arrays are changed in place.
+    the differences, which come out times cos theta.
     """
-    factors = grid.weights[: rings.shape[2]] * (np.cos(grid.theta[: rings.shape[2]]) if symmetry == 1 else 1)
-    mends = isinstance(grid, LatLong) and 2 * degree >= grid.rows
-    if not mends:
-        return _scaled(rings, factors)
+    plain = rings * like(_factors(grid, rings.shape[2], symmetry), rings)
+    if not _mends(grid, degree):
+        return plain
     xp = namespace(rings)
     mended = []
     for odd in (0, 1):
         waves, spread = (like(x, rings) for x in _mending(grid, degree, (odd + spin) % 2, symmetry))
         mended.append((rings[odd::2, ...] @ waves.mT) @ spread)
-    rings = _scaled(rings, factors)
-    if is_numpy(rings):
-        for odd in (0, 1):
-            rings[odd::2] += mended[odd]
-        return rings
     order = np.arange(rings.shape[0])
     order = xp.asarray(order // 2 + (order % 2) * mended[0].shape[0], device=rings.device)
-    return rings + xp.take(xp.concat(mended, axis=0), order, axis=0)
+    return plain + xp.take(xp.concat(mended, axis=0), order, axis=0)
 
 
-def _scaled(rings: Array, factors: np.ndarray) -> Array:
-    if is_numpy(rings):
-        rings *= like(factors, rings)
-        return rings
-    return rings * like(factors, rings)
+def mend(rings: np.ndarray, grid: Grid, degree: int) -> None:
+    """Put into `rings` (orders from an even one, 4 C, pairs), sums and differences of mirror rows which have their
+    plain weights already (the differences times cos theta), what these weights miss."""
+    if not _mends(grid, degree):
+        return
+    for symmetry, half in enumerate(np.split(rings, 2, axis=1)):
+        factors = _factors(grid, rings.shape[2], symmetry)
+        for odd in (0, 1):
+            waves, spread = _mending(grid, degree, odd, symmetry)
+            if waves.size:
+                half[odd::2] += (half[odd::2] @ like((waves / factors).T, rings)) @ like(spread, rings)
+
+
+def _mends(grid: Grid, degree: int) -> bool:
+    return isinstance(grid, LatLong) and 2 * degree >= grid.rows
+
+
+def _factors(grid: Grid, rows: int, symmetry: int | None) -> np.ndarray:
+    """The plain weights of a grid's first rows."""
+    factors: np.ndarray = grid.weights[:rows] * (np.cos(grid.theta[:rows]) if symmetry == 1 else 1)
+    return factors
 
 
 @lru_cache(maxsize=16)
-def _mending(grid: LatLong, degree: int, odd: int, symmetry: int | None) -> tuple[np.ndarray, np.ndarray]:
+def _mending(grid: Grid, degree: int, odd: int, symmetry: int | None) -> tuple[np.ndarray, np.ndarray]:
     """B and M B, each (frequencies, rows), in the normalisation of `grid.weights`."""
     n = grid.rows
     k = np.arange(n - degree, degree + 1)
