@@ -30,12 +30,16 @@ def look_ups(room: gn.Environment) -> None:
     w = gn.normalise(rng.normal(size=(1_000_000, 3))).astype(np.float32)
     layouts = (
         (gn.LatLongMap(), 512), (gn.CubeCross(), 1024), (gn.AngularMap(), 768), (gn.DualParaboloid(), 512),
-        (gn.MirrorBall(), 768),
+        (gn.MirrorBall(), 768), (gn.MirrorBall(4.0), 768),
     )  # fmt: skip
     for mapping, rows in layouts:
         other = room.resampled(mapping, rows, gn.Orientation.PANORAMA)
         kernel, plain = seconds(lambda o=other: o.radiance(w)), seconds(lambda o=other: o._radiance(w), 1)
-        print(f"look-up, {type(mapping).__name__:15s} {1 / kernel:8.1f} million/s   (array code {1 / plain:.1f})")
+        nearest = seconds(lambda o=other: o.nearest(w))
+        print(
+            f"look-up, {mapping!s:32s} {1 / kernel:6.1f} million/s, nearest {1 / nearest:6.1f}"
+            f"   (array code {1 / plain:.1f})"
+        )
 
 
 def resampling() -> None:

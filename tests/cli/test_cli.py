@@ -102,6 +102,16 @@ def test_convert_keeps_the_radiance_of_every_direction(capsys, tmp_path, environ
     np.testing.assert_allclose(gn.read_environment(cross).radiance(w), 1 + w, atol=0.02)
 
 
+def test_convert_writes_and_reads_the_six_faces_of_a_cube(capsys, tmp_path, environment):
+    run(capsys, "convert", environment, "--rows", 96, "-o", tmp_path / "sky_{face}.exr")
+    assert sorted(p.name for p in tmp_path.glob("sky_*")) == [f"sky_{s}{a}.exr" for s in "np" for a in "xyz"]
+    _, said, _ = run(capsys, "convert", tmp_path / "sky_{face}.exr", "--to", "latlong", "-o", tmp_path / "back.exr")
+    assert "CubeStrip PANORAMA -> LatLongMap PANORAMA" in said
+    w = gn.normalise(np.random.default_rng(1).normal(size=(500, 3)))
+    # As above, with another resampling.
+    np.testing.assert_allclose(gn.read_environment(tmp_path / "back.exr").radiance(w), 1 + w, atol=0.03)
+
+
 def test_convert_to_png_maps_tones(capsys, tmp_path, environment):
     code, _, _ = run(capsys, "convert", environment, "-o", tmp_path / "room.png")
     assert code == 0

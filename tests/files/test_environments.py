@@ -3,6 +3,8 @@ import pytest
 
 import gonio as gn
 from gonio.errors import FileError, ParameterError
+from gonio.files.images import write_images
+from gonio.frames import euler
 
 O = gn.Orientation
 
@@ -49,6 +51,57 @@ def test_what_is_written_for_a_tool_is_read_back_from_it_pixel_by_pixel(tmp_path
     np.testing.assert_array_equal(back.resampled(gn.LatLongMap(), 12, O.PANORAMA).image, room.image)
 
 
+@pytest.mark.parametrize("suffix", ["exr", "hdr"])
+@pytest.mark.parametrize("orientation", [O.PANORAMA, O.OPENEXR, O.GONIO.rotated(euler(0.7, -0.4, 2.1))])
+@pytest.mark.parametrize(
+    ("mapping", "rows"),
+    [
+        (gn.LatLongMap(), 8), (gn.CubeCross(vertical=False), 9), (gn.CubeStrip.openexr(), 24), (gn.AngularMap(), 16),
+        (gn.MirrorBall(5.0), 16), (gn.DualParaboloid(1.1), 16),
+    ],
+)  # fmt: skip
+def test_what_is_written_without_words_is_read_without_words(tmp_path, rng, suffix, orientation, mapping, rows):
+    if orientation is O.OPENEXR and not isinstance(mapping, gn.LatLongMap | gn.CubeStrip | gn.CubeCross):
+        orientation = O.PROBE
+    room = gn.Environment(rng.random((*mapping.shape(rows), 3)).astype(np.float32), mapping, orientation)
+    path = tmp_path / f"room.{suffix}"
+    gn.write_environment(path, room, mapping, orientation)
+    back = gn.read_environment(path)
+    assert back.mapping == mapping and back.orientation.name == orientation.name
+    w = gn.normalise(rng.normal(size=(200, 3)))
+    # Radiance pictures keep 8 bits of a pixel's largest channel.
+    np.testing.assert_allclose(back.radiance(w), room.radiance(w), atol=0 if suffix == "exr" else 1 / 256)
+
+
+def test_openexr_s_own_words_are_written_where_it_has_them(tmp_path, room):
+    path = tmp_path / "room.exr"
+    for mapping, orientation, word in (
+        (gn.LatLongMap(), O.OPENEXR, "latlong"),
+        (gn.CubeStrip.openexr(), O.OPENEXR, "cube"),
+        (gn.CubeStrip(), O.OPENEXR, None),
+        (gn.LatLongMap(), O.PANORAMA, None),
+    ):
+        gn.write_environment(path, room, mapping, orientation)
+        assert gn.image_info(path).attributes.get("envmap") == word
+
+
+def test_words_that_are_passed_override_the_header(tmp_path, room):
+    path = tmp_path / "room.exr"
+    gn.write_environment(path, room, orientation=O.MITSUBA)
+    assert gn.read_environment(path, gn.LatLongMap()).orientation is O.MITSUBA
+    assert gn.read_environment(path, orientation=O.BLENDER).orientation is O.BLENDER
+    assert gn.read_environment(path, gn.DualParaboloid()).orientation is O.PROBE
+
+
+@pytest.mark.parametrize("said", ["?", "[]", '{"layout": "Globe", "orientation": "PROBE"}',
+    '{"layout": "LatLongMap", "orientation": "x", "right": [1, 0], "up": [0, 1], "centre": [0, 0]}'])  # fmt: skip
+def test_a_header_of_nonsense_is_refused(tmp_path, said):
+    path = tmp_path / "room.exr"
+    write_images({path: np.ones((4, 8, 3))}, attributes={"gonio:environment": said})
+    with pytest.raises(FileError, match=r"room.exr: the header's gonio:environment"):
+        gn.read_environment(path)
+
+
 def test_another_layout_keeps_light_and_resolution(tmp_path, rng):
     w = gn.normalise(rng.normal(size=(200, 3)))
     own, _ = gn.LatLongMap().directions(48, 96)
@@ -76,6 +129,33 @@ def test_six_faces_are_known_by_their_names_in_any_order(tmp_path, names, rng):
         gn.write_image(path, image[4 * k : 4 * k + 4])
     read = gn.read_environment(paths[::-1], orientation=O.OPENGL)
     np.testing.assert_array_equal(read.image, image)
+
+
+@pytest.mark.parametrize("orientation", [O.OPENGL, O.OPENEXR], ids=lambda o: o.name)
+def test_six_faces_are_written_and_read_by_one_pattern(tmp_path, room, orientation):
+    gn.write_environment(tmp_path / "sky_{face}.exr", room, orientation=orientation)
+    assert sorted(p.name for p in tmp_path.iterdir()) == [f"sky_{s}{a}.exr" for s in "np" for a in "xyz"]
+    # The middle of pz shows the tool's +Z, which is -y of gonio's world; an even number of pixels meet there.
+    face = gn.read_image(tmp_path / "sky_pz.exr")
+    n = len(face) // 2
+    back = gn.read_environment(tmp_path / "sky_{face}.exr")
+    np.testing.assert_allclose(
+        back.radiance([0.0, -1.0, 0.0]), face[n - 1 : n + 1, n - 1 : n + 1].mean((0, 1)), rtol=1e-5
+    )
+    assert back.orientation is orientation
+    expected = room.resampled(back.mapping, back.rows, orientation)
+    np.testing.assert_array_equal(back.image, expected.image)
+    with pytest.raises(FileError, match=r"sky_px.hdr does not exist"):
+        gn.read_environment(tmp_path / "sky_{face}.hdr")
+
+
+def test_of_six_faces_none_appears_where_one_fails(tmp_path, room):
+    (tmp_path / "sky_nz.exr").mkdir()
+    with pytest.raises(FileError, match=r"sky_nz.exr is a folder"):
+        gn.write_environment(tmp_path / "sky_{face}.exr", room)
+    with pytest.raises(ParameterError, match=r"six faces.* not of CubeCross"):
+        gn.write_environment(tmp_path / "sky_{face}.exr", room, gn.CubeCross())
+    assert [p.name for p in tmp_path.iterdir()] == ["sky_nz.exr"]
 
 
 def test_faces_that_cannot_be_told_apart_are_refused(tmp_path):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import enum
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -9,7 +10,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from ..errors import ParameterError
-from .render import Curve, write
+from .render import Curve, shown, write
 
 if TYPE_CHECKING:
     from ..lights.environment import Environment
@@ -46,8 +47,8 @@ class Layout(enum.StrEnum):
 
 
 def convert(
-    source: list[Path] = typer.Argument(..., help="An image or environment map (two or six files for its parts)."),
-    output: Path = typer.Option(..., "--output", "-o", help="Where to; the suffix names the format."),
+    source: list[Path] = typer.Argument(..., help="An image or environment map (or its two or six parts)."),
+    output: Path = typer.Option(..., "--output", "-o", help="Where to; sky_{face}.exr writes the six faces of a cube."),
     to: Layout | None = typer.Option(None, "--to", help="Layout of the map that is written."),
     layout: Layout | None = typer.Option(None, "--from", help="Layout of the map read, where its shape does not tell."),
     orientation: str = typer.Option("", "--orientation", help="The tool whose convention the map read follows."),
@@ -58,17 +59,22 @@ def convert(
 ) -> None:
     """Convert an image's format, or (with --to) an environment map's layout and orientation."""
     import gonio as gn
-    from gonio.files.environments import as_picture
+    from gonio.files.environments import as_picture, is_pattern, strip_for
 
-    if to is None and layout is None and not orientation and not to_orientation and rows is None and len(source) == 1:
+    faces = is_pattern(output)
+    plain = len(source) == 1 and not faces and not is_pattern(source[0])
+    if plain and to is None and layout is None and not orientation and not to_orientation and rows is None:
         write(output, gn.read_image(source[0]), exposure, curve)
         typer.echo(str(output))
         return
     environment = gn.read_environment(
         source[0] if len(source) == 1 else source, layout.mapping() if layout else None, named(orientation)
     )
-    written = as_picture(environment, to.mapping() if to else None, named(to_orientation), rows)
-    write(output, written.image, exposure, curve)
+    stands = named(to_orientation)
+    mapping = to.mapping() if to else strip_for(stands) if faces else None
+    written = as_picture(environment, mapping, stands, rows)
+    picture = dataclasses.replace(written, image=shown(output, written.image, exposure, curve))
+    gn.write_environment(output, picture, picture.mapping, picture.orientation)
     typer.echo(f"{output}  {_stands(environment)} -> {_stands(written)}")
 
 

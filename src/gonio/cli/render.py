@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from . import parse
+from .info import MESHES
 from .progress import bar
 
 if TYPE_CHECKING:
@@ -29,17 +30,19 @@ def render(
     brdf: list[str] = typer.Option(
         ["lambert:albedo=.6"],
         "--brdf",
-        help="A model, name:key=value,...  (colours as r/g/b), or a measured file. Repeat to add terms.",
+        help="A measured file, or name:key=value,... with colours as r/g/b: lambert, ggx, ward, ... Repeat to add.",
     ),
     shape: str = typer.Option("sphere", "--shape", help="sphere, vase, a mesh file, or an image of heights."),
+    smooth: bool = typer.Option(False, "--smooth", help="Give a mesh smooth normals in place of its file's."),
+    y_up: bool = typer.Option(False, "--y-up", help="Stand a mesh up whose file has y upwards."),
     light: list[Path] = typer.Option([], "--light", help="An environment map. Without any light: a room of gonio's."),
     sun: list[str] = typer.Option([], "--sun", help="A directional light x,y,z[:irradiance], towards the light."),
     size: str = typer.Option("512", "--size", help="Pixels, as 640x480 or 512."),
-    samples: int = typer.Option(1024, "--samples", min=1, help="Light samples a pixel, for environments."),
+    samples: int = typer.Option(1024, "--samples", help="Light samples a pixel, for environments."),
     shadows: bool = typer.Option(False, "--shadows", help="Trace shadow rays."),
     eye: str = typer.Option("2.6,-3.2,1.6", "--eye", help="The camera's place x,y,z, z up, in radii of the shape."),
     field_of_view: float = typer.Option(34.0, "--fov", help="Vertical field of view in degrees."),
-    smooth: int = typer.Option(2, "--supersample", min=1, max=8, help="Rays a pixel along each side."),
+    supersample: int = typer.Option(2, "--supersample", help="Rays a pixel along each side."),
     background: bool = typer.Option(True, "--background/--no-background", help="Show the environment behind."),
     relief: float = typer.Option(1.0, "--relief", help="What an image of heights is multiplied by, in pixels."),
     exposure: float = typer.Option(0.0, "--exposure", help="Stops, for PNG."),
@@ -50,12 +53,14 @@ def render(
 
     columns, rows = parse.size(size)
     material = parse.reflectance(brdf)
-    scene, centre, radius = _shape(shape, relief)
+    scene, centre, radius = _shape(shape, relief, smooth, y_up)
+    towards = parse.vector(eye)
     camera = gn.Pinhole.look_at(
-        eye=[c + radius * e for c, e in zip(centre, parse.vector(eye), strict=True)],
+        eye=[c + radius * e for c, e in zip(centre, towards, strict=True)],
         target=centre,
         field_of_view=field_of_view,
         size=(rows, columns),
+        up=(0, 0, 1) if any(towards[:2]) else (0, 1, 0),  # from straight above, as a map lies
     )
     with bar("render") as progress:
         image = gn.render(
@@ -65,7 +70,7 @@ def render(
             camera,
             shadows=shadows,
             samples=samples,
-            supersample=smooth,
+            supersample=supersample,
             background=background,
             progress=progress,
         )
@@ -76,20 +81,29 @@ def render(
 def write(output: Path, image: Any, exposure: float, curve: Curve) -> None:
     """Linear where the format holds radiance, tone-mapped where it holds what a screen shows."""
     import gonio as gn
+
+    gn.write_image(output, shown(output, image, exposure, curve))
+
+
+def shown(output: Path, image: Any, exposure: float, curve: Curve) -> Any:
+    """The image as the format of `output` holds it: display colours for PNG, radiance otherwise."""
+    import gonio as gn
     from gonio.rendering import tonemap
 
-    if output.suffix.lower() == ".png":
-        curves: dict[Curve, Callable[[Any], Any]] = {
-            Curve.FILMIC: tonemap.Filmic(),
-            Curve.REINHARD: tonemap.Reinhard(),
-            Curve.LINEAR: tonemap.clipped,
-        }
-        image = gn.tone_map(image, curves[curve], exposure)
-    gn.write_image(output, image)
+    if output.suffix.lower() != ".png":
+        return image
+    curves: dict[Curve, Callable[[Any], Any]] = {
+        Curve.FILMIC: tonemap.Filmic(),
+        Curve.REINHARD: tonemap.Reinhard(),
+        Curve.LINEAR: tonemap.clipped,
+    }
+    return gn.tone_map(image, curves[curve], exposure)
 
 
-def _shape(name: str, relief: float) -> tuple[Any, list[float], float]:
-    """The shape, its centre and its radius."""
+def _shape(name: str, relief: float, smooth: bool, y_up: bool) -> tuple[Any, list[float], float]:
+    """The shape, and the centre and radius of a ball about it."""
+    import numpy as np
+
     import gonio as gn
 
     if name == "sphere":
@@ -99,12 +113,18 @@ def _shape(name: str, relief: float) -> tuple[Any, list[float], float]:
         from gonio.shapes.revolution import vase
 
         shape = vase()
-    elif Path(name).suffix.lower() in (".exr", ".png", ".tif", ".tiff", ".pfm"):
-        shape = gn.HeightField(relief * gn.read_image(name, encoding="linear")[..., 0])
-    else:
+    elif Path(name).suffix.lower() in MESHES:
         shape = gn.read_mesh(name)
-    low, high = shape.bounds
-    return shape, [float(c) for c in (low + high) / 2], float(((high - low) ** 2).sum() ** 0.5 / 2)
+        if smooth:
+            shape = gn.Mesh(shape.vertices, shape.faces, shape.uv)
+        if y_up:
+            turn = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])  # (X, Y, Z) -> (X, -Z, Y)
+            shape = gn.Mesh(shape.vertices @ turn.T, shape.faces, shape.uv, shape.normals @ turn.T)
+    else:
+        shape = gn.HeightField(relief * gn.read_image(name, encoding="linear")[..., 0])
+    centre = sum(shape.bounds) / 2
+    corners = shape.mesh.vertices if isinstance(shape, gn.HeightField) else shape.vertices
+    return shape, centre.tolist(), float(np.linalg.norm(corners - centre, axis=-1).max())
 
 
 def _light(maps: list[Path], suns: list[str]) -> Light:

@@ -100,13 +100,16 @@ def read_layers(path: Path) -> dict[str, np.ndarray]:
     return layers
 
 
-def write(path: Path, image: np.ndarray) -> None:
+def write(path: Path, image: np.ndarray, attributes: Mapping[str, str] | None = None) -> None:
     """Writes (rows, columns, 1 or 3), float16 or float32, as Y or as R, G, B."""
-    write_layers(path, {"RGB": image} if image.shape[2] == 3 else {"Y": image[..., 0]})
+    write_layers(path, {"RGB": image} if image.shape[2] == 3 else {"Y": image[..., 0]}, attributes)
 
 
-def write_layers(path: Path, layers: Mapping[str, np.ndarray]) -> None:
-    """Writes what `read_layers` reads: float16, float32 or uint32, (rows, columns) or (rows, columns, 3), all alike."""
+def write_layers(path: Path, layers: Mapping[str, np.ndarray], attributes: Mapping[str, str] | None = None) -> None:
+    """Writes what `read_layers` reads: float16, float32 or uint32, (rows, columns) or (rows, columns, 3), all alike.
+
+    attributes: text by name for the header; "envmap", "latlong" or "cube", is OpenEXR's own.
+    """
     import OpenEXR
 
     channels = {}
@@ -116,7 +119,9 @@ def write_layers(path: Path, layers: Mapping[str, np.ndarray]) -> None:
         else:
             prefix = "" if name == "RGB" else f"{name}."
             channels |= {f"{prefix}{c}": np.ascontiguousarray(image[..., k]) for k, c in enumerate("RGB")}
-    header = {"type": OpenEXR.scanlineimage, "compression": OpenEXR.ZIP_COMPRESSION}
+    header = {"type": OpenEXR.scanlineimage, "compression": OpenEXR.ZIP_COMPRESSION, **(attributes or {})}
+    if "envmap" in header:
+        header["envmap"] = {"latlong": OpenEXR.ENVMAP_LATLONG, "cube": OpenEXR.ENVMAP_CUBE}[header["envmap"]]
     with _silence():
         OpenEXR.File(header, channels).write(str(path))
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import functools
 import re
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -66,10 +67,11 @@ def read(path: Path) -> Raster:
     return Raster(colour, "linear")
 
 
-def write(path: Path, image: np.ndarray) -> None:
+def write(path: Path, image: np.ndarray, attributes: Mapping[str, str] | None = None) -> None:
     """Writes (rows, columns, 1 or 3), 0 to `LARGEST`, without run-length code, which every reader understands.
 
     Each channel is right to 1/256 of the pixel's largest one; what is below 2^-128 becomes black.
+    attributes: lines name=text of the header.
     """
     largest = functools.reduce(np.maximum, np.moveaxis(image, -1, 0))  # quicker than image.max(axis=-1)
     exponent = np.frexp(largest)[1]
@@ -80,7 +82,8 @@ def write(path: Path, image: np.ndarray) -> None:
     rgbe[..., 3] = exponent + 128
     rgbe[(exponent < -127) | (largest == 0)] = 0
     rows, columns = largest.shape
-    head = f"#?RADIANCE\n# Written by gonio\nFORMAT=32-bit_rle_rgbe\n\n-Y {rows} +X {columns}\n"
+    lines = "".join(f"{name}={text}\n" for name, text in (attributes or {}).items())
+    head = f"#?RADIANCE\n# Written by gonio\n{lines}FORMAT=32-bit_rle_rgbe\n\n-Y {rows} +X {columns}\n"
     path.write_bytes(head.encode() + rgbe.tobytes())
 
 

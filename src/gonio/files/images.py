@@ -123,7 +123,31 @@ def write_image(
     The file appears whole or not at all. Raises `ArrayError` where the image has NaN, infinite values or values that
     the format cannot hold; `ParameterError` for bits or an encoding that the format has not; `FileError` otherwise.
     """
-    path = Path(path)
+    write_images({Path(path): image}, encoding, bits=bits, clip=clip)
+
+
+def write_images(
+    images: Mapping[Path, Array],
+    encoding: Encoding | None = None,
+    *,
+    bits: int | None = None,
+    clip: bool = False,
+    attributes: Mapping[str, str] | None = None,
+) -> None:
+    """`write_image` for several files, of which all appear or none.
+
+    attributes: text by name for the headers of .exr and .hdr; other formats hold none.
+    """
+    with contextlib.ExitStack() as stack:
+        for path, image in images.items():
+            samples, curve = _encoded(path, image, encoding, bits, clip)
+            _save(stack.enter_context(writing(path)), samples, curve, attributes)
+
+
+def _encoded(
+    path: Path, image: Array, encoding: Encoding | None, bits: int | None, clip: bool
+) -> tuple[np.ndarray, Encoding]:
+    """Samples (rows, columns, 1 or 3) as the format of the suffix stores them, and how they stand for light."""
     suffix = path.suffix.lower()
     if suffix not in _BITS:
         raise FileError(f"{path}: images are written as {' '.join(_BITS)}, not {suffix or 'without suffix'}.")
@@ -138,16 +162,19 @@ def write_image(
         samples = _floats(pixels, np.float16 if bits == 16 else np.float32)
         if suffix in (".hdr", ".pic"):
             _require_range(samples, 0, hdr.LARGEST, "Write .exr, which holds it.")
+        return samples, "linear"
+    curve = "srgb" if encoding is None else encoding
+    return _codes(pixels, curve, np.uint8 if bits == 8 else np.uint16, clip), curve
+
+
+def _save(path: Path, samples: np.ndarray, curve: Encoding, attributes: Mapping[str, str] | None) -> None:
+    suffix = path.suffix.lower()
+    if suffix == ".png":
+        png.write(path, samples, curve)
+    elif suffix in (".exr", ".hdr", ".pic"):
+        (exr if suffix == ".exr" else hdr).write(path, samples, attributes)
     else:
-        chosen = "srgb" if encoding is None else encoding
-        samples = _codes(pixels, chosen, np.uint8 if bits == 8 else np.uint16, clip)
-    with writing(path) as temporary:
-        if suffix == ".png":
-            png.write(temporary, samples, chosen)
-        else:
-            {".exr": exr, ".hdr": hdr, ".pic": hdr, ".pfm": pfm, ".tif": tiff, ".tiff": tiff}[suffix].write(
-                temporary, samples
-            )
+        (pfm if suffix == ".pfm" else tiff).write(path, samples)
 
 
 def write_layers(path: str | os.PathLike[str], layers: Mapping[str, Array]) -> None:

@@ -91,6 +91,16 @@ class Orientation:
         right = cross(c, u) * (-1.0 if mirrored else 1.0)
         return cls("looking", {kind: np.stack((right, u, c), axis=-1) for kind in set(_KINDS.values())})
 
+    @classmethod
+    def of(cls, name: str, mapping: Mapping, frame: np.ndarray) -> Orientation:
+        """For layouts like `mapping` alone: the columns of `frame` (3, 3) are the world's right, up and centre.
+
+        Raises `DirectionError` where these are not unit and orthogonal.
+        """
+        if frame.shape != (3, 3) or not np.allclose(frame.T @ frame, np.eye(3), atol=1e-6):
+            raise DirectionError(f"right, up and centre of {name} are not three orthogonal unit directions.")
+        return cls(name, {_KINDS[type(mapping)]: frame})
+
     def matrix(self, mapping: Mapping) -> np.ndarray:
         """(3, 3), orthogonal, determinant +1 or -1: own directions of `mapping` to world directions, w = M own.
 
