@@ -5,6 +5,9 @@ An error says what came, where, and the way out. A warning names data that can s
 
 from __future__ import annotations
 
+# Bytes that one answer may take unless the caller allows more: beyond it, `MemoryLimitError`.
+MEMORY_LIMIT = 4_000_000_000
+
 
 class GonioError(ValueError):
     """The root of all refusals: `except gonio.GonioError` catches every one of them and nothing else."""

@@ -17,9 +17,8 @@ import numpy as np
 from .._kernels import bvh
 from ..arrays import Array, require_finite, to_numpy
 from ..directions import cross, dot, require_unit
-from ..errors import ArrayError, MemoryLimitError
+from ..errors import MEMORY_LIMIT, ArrayError, MemoryLimitError
 
-MEMORY_LIMIT = 4 << 30
 # In units of the scaled box. Single precision places points there to 6e-8; this is far above it, and unseen.
 CLEARANCE = 1e-5
 BLOCK = 1 << 14  # rays at once, so that their temporaries stay in the cache

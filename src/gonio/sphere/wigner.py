@@ -19,12 +19,11 @@ import numpy as np
 
 from .._kernels import wigner as kernel
 from ..arrays import Array, floats, is_numpy, like
-from ..errors import MemoryLimitError, ParameterError
+from ..errors import MEMORY_LIMIT, MemoryLimitError, ParameterError
 from .harmonics import require_degree
 
-# Beyond it the smallest starts of the recursion leave float64 (see the kernel).
+# Beyond it the smallest starts of the recursion leave float64, and rows the kernel's room.
 HIGHEST_DEGREE = 1500
-MEMORY_LIMIT = 4_000_000_000  # bytes of one answer
 
 
 def wigner_d(degree: int, angle: Array, memory_limit: int = MEMORY_LIMIT) -> Array:
