@@ -162,3 +162,13 @@ def test_the_bunny_is_seen_whole(data):
     assert np.isfinite(view.frames[view.mask]).all()
     # Eyes outside a closed surface see outsides: hardly any shading normal looks away.
     assert ((view.normal * view.wo).sum(axis=-1)[view.mask] > 0).mean() > 0.98
+
+
+def test_no_face_seen_from_outside_is_shaded_from_below():
+    # A ball of eight by eight faces, whose smooth normals turn away at the outline from an eye that sees the face.
+    theta = np.linspace(math.pi, 0, 9)
+    ball = revolve(np.stack((abs(np.sin(theta)), np.cos(theta)), axis=-1), 8)
+    view = ball.view(gn.Pinhole.look_at((4, 1, 0.3), (0, 0, 0), field_of_view=40, size=(64, 64)))
+    outside = view.mask & ((view.geometric * view.wo).sum(axis=-1) > 0)
+    assert (view.normal * view.wo).sum(axis=-1)[outside].min() > 0
+    np.testing.assert_allclose(np.linalg.norm(view.normal[outside], axis=-1), 1)

@@ -26,6 +26,9 @@ from ..frames import frame
 from .view import Shape, View
 from .visibility import Scene
 
+# The least cosine between a shading normal and the eye, where the face itself is seen from its outside.
+GRAZING = 0.01
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Mesh(Shape):
@@ -124,6 +127,8 @@ class Mesh(Shape):
         normal = np.where(dot(normal, normal)[:, None] > 0, normal, geometric)
         # Faces wound against their given normals lie on the normals' side too.
         geometric = np.where(dot(geometric, normal)[:, None] < 0, -geometric, geometric)
+        wo = np.broadcast_to(-to_numpy(directions), (*mask.shape, 3))[mask]
+        normal = _towards(normal, geometric, wo)
         below = np.maximum(dot(corners - position[:, None], normals), 0)[..., None]
         lifted = position + (weight * below * normals).sum(axis=1) + self.scene.clearance * geometric
         return View.of(
@@ -134,7 +139,7 @@ class Mesh(Shape):
             normal=normal,
             tangent=self._tangent(corner, weight, normal),
             uv=None if self.uv is None else (weight * self.uv[corner]).sum(axis=1),
-            wo=np.broadcast_to(-to_numpy(directions), (*mask.shape, 3))[mask],
+            wo=wo,
             distance=hits.distance[mask],
         )
 
@@ -150,6 +155,16 @@ class Mesh(Shape):
         tangent = tangent - dot(tangent, normal)[:, None] * normal
         usable = dot(tangent, tangent)[:, None] > 1e-6
         return np.asarray(np.where(usable, _unit_or_zero(tangent), anyhow))
+
+
+def _towards(normal: np.ndarray, geometric: np.ndarray, wo: np.ndarray) -> np.ndarray:
+    """Shading normals (N, 3), bent just towards the eye where they look away from it and the faces do not.
+
+    Smooth normals turn away at the outline before the faces do, which would leave black dots there.
+    """
+    away = (dot(normal, wo) < GRAZING) & (dot(geometric, wo) > 0)
+    bent = normal + (GRAZING - dot(normal, wo))[:, None] * wo
+    return np.asarray(np.where(away[:, None], _unit_or_zero(bent), normal))
 
 
 def _across(corners: np.ndarray) -> np.ndarray:
