@@ -42,7 +42,7 @@ def test_info_tells_size_format_and_layout(capsys, environment):
     code, out, _ = run(capsys, "info", environment, "--json")
     facts = json.loads(out)
     assert code == 0
-    assert facts["pixels"] == "32 x 16"
+    assert (facts["columns"], facts["rows"], sorted(facts["channels"])) == (32, 16, ["B", "G", "R"])
     assert facts["environment map"].startswith("LatLongMap")
     assert facts["mean"] == pytest.approx([1, 1, 1], abs=1e-6)
 
@@ -51,6 +51,32 @@ def test_a_missing_file_is_one_line_on_stderr_and_exit_2(capsys, tmp_path):
     code, out, err = run(capsys, "info", tmp_path / "no.exr")
     assert (code, out, err.count("\n")) == (2, "", 1)
     assert "no.exr" in err
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        "paint",
+        "info --loud x",
+        "render --size 9999999 -o x.exr",
+        "render --samples 0 -o x.exr",
+        "render --sun 0,0,0 -o x",
+    ],
+)
+def test_bad_use_and_too_much_are_one_line_and_exit_2(capsys, arguments):
+    code, out, err = run(capsys, *arguments.split())
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert err.startswith("gonio: error: ")
+
+
+def test_ctrl_c_is_exit_130(capsys, monkeypatch, tmp_path):
+    def stopped(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("gonio.rendering.image.radiance", stopped)
+    output = tmp_path / "x.exr"
+    assert run(capsys, "render", "--size", 8, "-o", output) == (130, "", "gonio: stopped\n")
+    assert not output.exists()
 
 
 def test_an_unknown_suffix_lists_the_known_ones(capsys, tmp_path):
@@ -73,6 +99,27 @@ def test_a_misspelt_parameter_is_met_with_the_models_own(capsys, tmp_path):
     assert "alpha" in err
 
 
+@pytest.mark.parametrize(
+    ("term", "names"),
+    [
+        ("lambert:albedo=.5,albedo=.7", "twice"),
+        ("ggx:alpha=.1/.2/.3", "alpha is one number"),
+        ("ggx:f0=.9,eta=2", "Schlick has no 'eta'"),
+        ("ggx:k=3", "Conductor also needs eta"),
+        ("lambert:albedo", "key=value"),
+        ("lambert:albedo=red", "red"),
+    ],
+)
+def test_what_a_term_says_wrongly_is_named(term, names):
+    with pytest.raises(gn.GonioError, match=names):
+        parse.reflectance([term])
+
+
+@pytest.mark.parametrize("name", [*parse.ANALYTIC, *parse.FACETS])
+def test_every_model_is_made_by_its_name(name):
+    assert parse.reflectance([name]).f([[0.0, 0, 1]], [[0.0, 0, 1]]) >= 0
+
+
 def test_a_parameter_out_of_range_is_refused_by_name(capsys, tmp_path):
     code, _, err = run(capsys, "render", "--brdf", "lambert:albedo=2", "-o", tmp_path / "x.png")
     assert code == 2
@@ -91,6 +138,42 @@ def test_render_of_a_matte_ball_under_a_sun_is_albedo_over_pi_times_cosine(capsy
     camera = gn.Pinhole.look_at(eye=(0, -4, 0), target=(0, 0, 0), field_of_view=1, size=(8, 8))
     cosine = np.maximum(gn.Sphere().view(camera).normal[..., 2], 0)
     np.testing.assert_allclose(image[..., 0], 0.5 / np.pi * 2 * cosine, atol=1e-6)
+
+
+def seen_from(eye, capsys, tmp_path, *arguments):
+    output = tmp_path / "seen.exr"
+    code, _, err = run(capsys, "render", "--eye", eye, "--size", 16, "--supersample", 1, *arguments, "-o", output)
+    assert code == 0, err
+    return gn.read_image(output)[..., 0]
+
+
+def test_a_mesh_with_y_up_is_stood_up(capsys, tmp_path):
+    # A triangle in the plane y = 0 of the file, facing its up: from above it is lit by a sun overhead.
+    (tmp_path / "up.obj").write_text("v -1 0 1\nv 1 0 1\nv 0 0 -1\nf 1 2 3\n")
+    image = seen_from("0,0,4", capsys, tmp_path, "--shape", tmp_path / "up.obj", "--y-up", "--sun", "0,0,1")
+    assert image.max() == pytest.approx(0.6 / np.pi)
+    # Its tip, at -z of the file, goes to +y, which is up in a view from straight above.
+    assert (image > 0).sum(axis=1)[5] < (image > 0).sum(axis=1)[10]
+
+
+def test_smooth_normals_take_the_place_of_a_files_facets(capsys, tmp_path):
+    # A roof with facet normals in the file: two shades. Smooth normals shade the ridge between them.
+    roof = "v 0 -1 1\nv 0 1 1\nv 1 0 0\nv -1 0 0\n"
+    facets = "vn .7 0 .7\nvn -.7 0 .7\nf 1//1 3//1 2//1\nf 2//2 4//2 1//2\n"
+    (tmp_path / "roof.obj").write_text(roof + facets)
+    given = ("--shape", tmp_path / "roof.obj", "--sun", "1,0,1")
+    assert len(np.unique(seen_from("0,0,4", capsys, tmp_path, *given).round(4))) == 2  # lit, and black elsewhere
+    assert len(np.unique(seen_from("0,0,4", capsys, tmp_path, *given, "--smooth").round(4))) > 3
+
+
+def test_info_draws_an_image_to_look_at(capsys, tmp_path, environment):
+    picture = tmp_path / "seen.png"
+    code, _, _ = run(capsys, "info", environment, "--picture", picture)
+    assert code == 0
+    # Exposed by itself: the log-average comes to .18 and the curve leaves middle grey in the middle.
+    assert 0.05 < gn.read_image(picture).mean() < 0.5
+    code, _, err = run(capsys, "info", environment, "--picture", tmp_path / "seen.exr")
+    assert (code, err.count("\n")) == (2, 1)
 
 
 def test_convert_keeps_the_radiance_of_every_direction(capsys, tmp_path, environment):

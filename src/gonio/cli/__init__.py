@@ -6,16 +6,16 @@ Exit 0 done, 1 did not converge, 2 bad use or input, 130 stopped by Ctrl-C. An e
 
 from __future__ import annotations
 
-import functools
 import sys
 import warnings
-from collections.abc import Callable
 from typing import Any
 
 import typer
 
 from ..errors import GonioError
 from . import convert, demo, info, render
+
+Usage: Any = typer.BadParameter.__base__  # click's error for whatever is mistyped, which typer does not name
 
 app = typer.Typer(
     help="From photographs of a known shape to reflectance and light that you can render.",
@@ -41,31 +41,34 @@ def gonio(
     """From photographs of a known shape to reflectance and light that you can render."""
 
 
-def guarded(verb: Callable[..., None]) -> Callable[..., None]:
-    """`verb`, with its refusals turned into one line and an exit code."""
-
-    @functools.wraps(verb)
-    def run(**arguments: Any) -> None:
-        try:
-            verb(**arguments)
-        except GonioError as error:
-            print(f"gonio: error: {error}", file=sys.stderr)
-            raise typer.Exit(2) from None
-        except KeyboardInterrupt:
-            print("gonio: stopped", file=sys.stderr)
-            raise typer.Exit(130) from None
-
-    return run
-
-
 for verb in (info.info, convert.convert, render.render, demo.demo):
-    app.command(no_args_is_help=verb is not demo.demo)(guarded(verb))
+    app.command(no_args_is_help=verb is not demo.demo)(verb)
 
 
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line and exit with its code."""
     warnings.showwarning = _one_line
-    app(arguments)
+    try:
+        code = app(arguments, standalone_mode=False) or 0
+    except (KeyboardInterrupt, typer.Abort):
+        code = 130
+    except Usage as error:
+        code, message = error.exit_code, error.format_message()
+        if message:  # none where nothing was typed: the help has been shown
+            _say_error(message)
+    except GonioError as error:
+        code = 2
+        _say_error(error)
+    except MemoryError as error:
+        code = 2
+        _say_error(f"not enough memory: {error}. Ask for fewer pixels, rows or samples.")
+    if code == 130:
+        print("gonio: stopped", file=sys.stderr)
+    sys.exit(code)
+
+
+def _say_error(message: object) -> None:
+    print(f"gonio: error: {message}", file=sys.stderr)
 
 
 def _one_line(message: Warning | str, *_: Any, **__: Any) -> None:

@@ -11,14 +11,17 @@ import typer
 IMAGES = (".exr", ".hdr", ".pic", ".pfm", ".png", ".tif", ".tiff", ".jpg", ".jpeg", ".tga")
 RAW = (".dng", ".cr2", ".cr3", ".nef", ".arw", ".raf", ".orf", ".rw2")
 BRDFS = (".binary", ".bsdf", ".brdf")
-MESHES = (".obj", ".ply", ".stl", ".glb", ".gltf", ".off")
+MESHES = (".obj", ".ply", ".stl", ".off")
 
 
 def info(
     files: list[Path] = typer.Argument(..., help="Images, environment maps, BRDF files, meshes."),
     as_json: bool = typer.Option(False, "--json", help="One JSON object a file, a line each."),
+    picture: Path | None = typer.Option(None, "--picture", help="A PNG to look at: an image, or the lobes of BRDFs."),
 ) -> None:
     """Say what files hold: sizes, formats, ranges, albedos, what looks wrong."""
+    if picture:
+        _draw(files, picture)
     for path in files:
         facts = describe(path)
         if as_json:
@@ -45,6 +48,23 @@ def describe(path: Path) -> dict[str, Any]:
     raise FileError(f"{path}: not a kind of file that gonio knows ({known}, and camera raw).")
 
 
+def _draw(files: list[Path], picture: Path) -> None:
+    """One image, exposed for its own brightness, or the lobes of BRDF files together."""
+    import gonio as gn
+    from gonio.errors import ParameterError
+    from gonio.viewer.plots import lobes
+
+    if picture.suffix.lower() != ".png":
+        raise ParameterError(f"--picture {picture}: the picture is a PNG; end its name in .png.")
+    kinds = {path.suffix.lower() for path in files}
+    if kinds <= set(BRDFS):
+        lobes(picture, {path.stem: gn.read_brdf(path) for path in files})
+    elif len(files) == 1 and kinds <= set(IMAGES + RAW):
+        gn.write_image(picture, gn.tone_map(gn.read_image(files[0]).clip(0), exposure=None))
+    else:
+        raise ParameterError("--picture shows one image, or BRDF files together.")
+
+
 def _image(path: Path) -> dict[str, Any]:
     import numpy as np
 
@@ -57,8 +77,9 @@ def _image(path: Path) -> dict[str, Any]:
     facts: dict[str, Any] = {
         "kind": "image",
         "format": header.format,
-        "pixels": f"{header.columns} x {header.rows}",
-        "channels": ", ".join(header.channels),
+        "columns": header.columns,
+        "rows": header.rows,
+        "channels": list(header.channels),
         "samples": header.dtype,
         "encoding": header.encoding or "not stated",
         "mean": image.mean(axis=(0, 1)).tolist(),

@@ -23,6 +23,7 @@ ANALYTIC = {
     "lambert": "Lambert",
     "oren-nayar": "OrenNayar",
     "phong": "Phong",
+    "modified-phong": "ModifiedPhong",
     "blinn-phong": "BlinnPhong",
     "lafortune": "Lafortune",
     "ward": "Ward",
@@ -85,7 +86,10 @@ def _term(text: str) -> BRDF:
         near = difflib.get_close_matches(name, known, n=1)
         hint = f" Did you mean {near[0]}?" if near else ""
         raise ParameterError(f"'{name}' is neither a file nor a model ({', '.join(known)}).{hint}")
-    given = dict(_pair(part, text) for part in rest.split(",")) if rest else {}
+    pairs = [_pair(part, text) for part in rest.split(",")] if rest else []
+    given = dict(pairs)
+    if len(given) < len(pairs):
+        raise ParameterError(f"'{text}' says one thing twice.")
     weight = given.pop("weight", None)
     if name in FACETS:
         brdf: BRDF = _microfacet(FACETS[name], given, text)
@@ -95,17 +99,12 @@ def _term(text: str) -> BRDF:
 
 
 def _microfacet(facets: str, given: dict[str, Any], text: str) -> BRDF:
-    """`alpha` or `alpha_x, alpha_y`; `eta` (dielectric), `eta` and `k` (conductor) or `f0` (Schlick)."""
+    """`alpha`, and `alpha_y` where they differ; `eta` (dielectric), `eta` and `k` (conductor) or `f0` (Schlick)."""
     import gonio as gn
 
-    fresnel: Any
-    if "f0" in given:
-        fresnel = gn.Schlick(given.pop("f0"))
-    elif "k" in given:
-        fresnel = gn.Conductor(given.pop("eta", 1.0), given.pop("k"))
-    else:
-        fresnel = gn.Fresnel(given.pop("eta", 1.5))
-    return gn.Microfacet(_made(getattr(gn, facets), given, text), fresnel)
+    optics: dict[str, Any] = {key: given.pop(key) for key in ("f0", "eta", "k") if key in given}
+    fresnel = gn.Schlick if "f0" in optics else gn.Conductor if "k" in optics else gn.Fresnel
+    return gn.Microfacet(_made(getattr(gn, facets), given, text), _made(fresnel, optics, text))
 
 
 def _made(model: Any, given: dict[str, Any], text: str) -> Any:
@@ -113,6 +112,8 @@ def _made(model: Any, given: dict[str, Any], text: str) -> Any:
     for key in given:
         if key not in fields:
             raise ParameterError(f"'{text}': {model.__name__} has no '{key}'; it has {', '.join(fields)}.")
+        if isinstance(given[key], list) and not (key in model.bounds and model.bounds[key].colour):
+            raise ParameterError(f"'{text}': {key} is one number; only colours are written r/g/b.")
     missing = [
         field.name
         for field in dataclasses.fields(model)
