@@ -75,7 +75,7 @@ def test_ctrl_c_is_exit_130(capsys, monkeypatch, tmp_path):
 
     monkeypatch.setattr("gonio.rendering.image.radiance", stopped)
     output = tmp_path / "x.exr"
-    assert run(capsys, "render", "--size", 8, "-o", output) == (130, "", "gonio: stopped\n")
+    assert run(capsys, "render", "--sun", "0,0,1", "--size", 8, "-o", output) == (130, "", "gonio: stopped\n")
     assert not output.exists()
 
 
@@ -97,6 +97,14 @@ def test_a_misspelt_parameter_is_met_with_the_models_own(capsys, tmp_path):
     code, _, err = run(capsys, "render", "--brdf", "ggx:rough=.2", "-o", tmp_path / "x.png")
     assert code == 2
     assert "alpha" in err
+
+
+@pytest.mark.parametrize("name", ["no-folder/x.exr", "x.jpg"])
+def test_where_a_picture_cannot_go_is_said_before_it_is_rendered(capsys, monkeypatch, tmp_path, name):
+    monkeypatch.setattr("gonio.rendering.image.radiance", None)  # what is not callable is not called
+    code, _, err = run(capsys, "render", "-o", tmp_path / name)
+    assert (code, err.count("\n")) == (2, 1)
+    assert name in err
 
 
 @pytest.mark.parametrize(

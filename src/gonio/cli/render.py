@@ -50,7 +50,9 @@ def render(
 ) -> None:
     """Render a shape with a BRDF under environment maps and directional lights."""
     import gonio as gn
+    from gonio.files.images import require_writable
 
+    require_writable(output)
     columns, rows = parse.size(size)
     material = parse.reflectance(brdf)
     scene, centre, radius = _shape(shape, relief, smooth, y_up)

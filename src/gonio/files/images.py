@@ -38,7 +38,7 @@ from ..errors import (
 )
 from . import exr, hdr, jpeg, pfm, png, raw, tga, tiff
 from .raster import Encoding, ImageInfo, Raster, require_file
-from .whole import writing
+from .whole import writable, writing
 
 CLIPPED_SHARE = 1e-3
 """The share of pixels at the brightest code from which a reader warns."""
@@ -149,8 +149,7 @@ def _encoded(
 ) -> tuple[np.ndarray, Encoding]:
     """Samples (rows, columns, 1 or 3) as the format of the suffix stores them, and how they stand for light."""
     suffix = path.suffix.lower()
-    if suffix not in _BITS:
-        raise FileError(f"{path}: images are written as {' '.join(_BITS)}, not {suffix or 'without suffix'}.")
+    require_writable(path)
     bits = _BITS[suffix][0] if bits is None else bits
     if bits not in _BITS[suffix]:
         raise ParameterError(f"bits must be {' or '.join(map(str, _BITS[suffix]))} for {suffix}, got {bits}.")
@@ -175,6 +174,14 @@ def _save(path: Path, samples: np.ndarray, curve: Encoding, attributes: Mapping[
         (exr if suffix == ".exr" else hdr).write(path, samples, attributes)
     else:
         (pfm if suffix == ".pfm" else tiff).write(path, samples)
+
+
+def require_writable(path: str | os.PathLike[str]) -> None:
+    """Raises `FileError` where `write_image` could not write to `path`: for asking before long work."""
+    suffix = Path(path).suffix.lower()
+    if suffix not in _BITS:
+        raise FileError(f"{path}: images are written as {' '.join(_BITS)}, not {suffix or 'without suffix'}.")
+    writable(path)
 
 
 def write_layers(path: str | os.PathLike[str], layers: Mapping[str, Array]) -> None:

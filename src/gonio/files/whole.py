@@ -26,16 +26,7 @@ def writing(path: str | os.PathLike[str]) -> Iterator[Path]:
     An existing file is replaced and its permissions are kept; a symbolic link is followed. Raises `FileError` where
     `path` is a folder or a device, its folder does not exist, or the system refuses to write there.
     """
-    target = Path(os.path.realpath(path))
-    if target.is_dir():
-        raise FileError(f"{path} is a folder. Give the name of a file to write.")
-    if not target.parent.is_dir():
-        raise FileError(f"{path}: the folder {target.parent} does not exist. Make it first.")
-    if target.exists() and not target.is_file():
-        raise FileError(f"{path} is not a regular file. Give the name of a file to write.")
-    if target.exists() and not os.access(target, os.W_OK):
-        raise FileError(f"{path} is write-protected. Change its permissions or give another name.")
-
+    target = writable(path)
     temporary = target.with_name(f".gonio-{secrets.token_hex(8)}{target.suffix}")
     try:
         # Not tempfile: its files are readable by the owner only, and would stay so under the final name.
@@ -50,3 +41,17 @@ def writing(path: str | os.PathLike[str]) -> Iterator[Path]:
         raise FileError(f"{path} cannot be written: {error.strerror or error}.") from error
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def writable(path: str | os.PathLike[str]) -> Path:
+    """The file that writing to `path` would make or replace, links followed. Raises `FileError` as `writing` does."""
+    target = Path(os.path.realpath(path))
+    if target.is_dir():
+        raise FileError(f"{path} is a folder. Give the name of a file to write.")
+    if not target.parent.is_dir():
+        raise FileError(f"{path}: the folder {target.parent} does not exist. Make it first.")
+    if target.exists() and not target.is_file():
+        raise FileError(f"{path} is not a regular file. Give the name of a file to write.")
+    if target.exists() and not os.access(target, os.W_OK):
+        raise FileError(f"{path} is write-protected. Change its permissions or give another name.")
+    return target
