@@ -257,10 +257,63 @@ def test_degrees_above_the_exits_stay_open(rng, light):
     np.testing.assert_array_equal(found.known, [True, True, True, False, False])
 
 
+@pytest.mark.parametrize("dtype", ["complex64", "complex128"])
+def test_tensors_pass(rng, light, dtype):
+    torch = pytest.importorskip("torch")
+    kind, real = getattr(torch, dtype), getattr(torch, {"complex64": "float32", "complex128": "float64"}[dtype])
+    tolerance = {"complex64": 1e-4, "complex128": 1e-12}[dtype]  # 5e-7 of rounding, divided by what is small
+    coefficients, _ = light
+    rho, wo = smooth(rng, DEGREE, 3), exits(rng, 2)
+    field = convolution.reflect(coefficients, rho)
+    every = rng.normal(size=((DEGREE + 1) ** 2, 16))
+    whole = convolution.reflect_anisotropic(coefficients, every)
+    one, two, three = torch.tensor(coefficients, dtype=kind), torch.tensor(rho, dtype=real), torch.tensor(every)
+    beta = torch.tensor([0.3, 1.0], dtype=real)
+    tensors, all_tensors = convolution.reflect(one, two), convolution.reflect_anisotropic(one, three.to(real))
+    pairs = [
+        (tensors, field, kind),
+        (all_tensors, whole, kind),
+        (convolution.radiance(tensors, 1.0, beta, wo.tolist()), convolution.radiance(field, 1.0, [0.3, 1], wo), real),
+        (
+            convolution.radiance_anisotropic(all_tensors, 1.0, beta, 0.2, torch.tensor(wo, dtype=real)),
+            convolution.radiance_anisotropic(whole, 1.0, [0.3, 1], 0.2, wo),
+            real,
+        ),
+        (convolution.brdf_from_light(tensors, one).value, np.repeat(rho[..., None], 3, axis=-1), real),
+        (convolution.light_from_brdf(tensors, two).value, coefficients, kind),
+    ]
+    for found, expected, wanted in pairs:
+        assert isinstance(found, torch.Tensor) and found.dtype == wanted
+        np.testing.assert_allclose(found, expected, rtol=0, atol=tolerance * np.abs(expected).max())
+    with pytest.raises(ArrayError, match="NumPy"):
+        convolution.factor(tensors)
+    with pytest.raises(ArrayError, match="mixed"):
+        convolution.reflect(one, rho)
+
+
+def test_gradients_reach_light_and_brdf(rng, light):
+    torch = pytest.importorskip("torch")
+    one = torch.tensor(light[0], requires_grad=True)
+    two = torch.tensor(smooth(rng, DEGREE, 3), requires_grad=True)
+    B = convolution.radiance(convolution.reflect(one, two), 1.0, 0.3, exits(rng, 1)[0].tolist())
+    B.sum().backward()
+    # B is linear in either.
+    np.testing.assert_allclose(torch.sum(two.grad * two.detach()), B.sum().detach(), rtol=1e-10)
+    np.testing.assert_allclose(torch.sum(one.grad.conj() * one.detach()).real, B.sum().detach(), rtol=1e-10)
+
+
 def test_the_lower_degree_counts(rng, light):
     coefficients, _ = light
     assert convolution.reflect(coefficients, smooth(rng, 2, 3)).shape == (9, 4, 3, 3)
     assert convolution.reflect(coefficients, smooth(rng, 9, 3)).shape == (25, 4, 4, 3)
+
+
+def test_a_grey_brdf_reflects_coloured_light(rng, light):
+    coefficients, _ = light
+    rho = rng.normal(size=((DEGREE + 1) ** 2, 16))
+    field = convolution.reflect_anisotropic(coefficients, rho)
+    assert field.shape == (165, 16, 3)
+    np.testing.assert_array_equal(field[..., 1], convolution.reflect_anisotropic(coefficients[:, 1], rho))
 
 
 def test_bad_input_is_refused(rng, light):

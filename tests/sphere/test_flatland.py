@@ -68,6 +68,28 @@ def test_what_lambert_swallows_is_masked_not_guessed(rng):
     assert np.all(found.value[~found.known] == 0)
 
 
+def test_tensors_pass(rng):
+    torch = pytest.importorskip("torch")
+    light, transfer = lights(rng, 5), flatland.transfer(glossy, 5, 8)
+    field = flatland.reflect(light, transfer)
+    one, two = torch.tensor(light), torch.tensor(transfer)
+    alpha = torch.tensor([0.3, -2.0], dtype=torch.float64)
+    tensor_field = flatland.reflect(one, two)
+    theta = -math.pi + 2 * math.pi / 13 * np.arange(13)
+    pairs = [
+        (tensor_field, field),
+        (flatland.radiance(tensor_field, alpha, 0.5), flatland.radiance(field, [0.3, -2.0], 0.5)),
+        (flatland.brdf_from_light(tensor_field, one).value, transfer),
+        (flatland.light_from_brdf(tensor_field, two).value, light),
+        (flatland.analysis(torch.tensor(np.cos(theta)), 6), flatland.analysis(np.cos(theta), 6)),
+        (flatland.synthesis(one, alpha), flatland.synthesis(light, [0.3, -2.0])),
+    ]
+    for found, expected in pairs:
+        assert isinstance(found, torch.Tensor) and found.dtype == torch.complex128
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12)
+    assert flatland.synthesis(one.to(torch.complex64), alpha).dtype == torch.complex64
+
+
 def test_bad_input_is_refused():
     with pytest.raises(ArrayError, match="degree 3"):
         flatland.analysis(np.zeros(6), 3)
@@ -77,5 +99,7 @@ def test_bad_input_is_refused():
         flatland.synthesis(np.zeros(4), 0.1)
     with pytest.raises(ArrayError, match="meet"):
         flatland.reflect(np.zeros(3), np.zeros((5, 5)))
+    with pytest.raises(ArrayError, match="field"):
+        flatland.radiance(np.zeros(3), 0.1, 0.1)
     with pytest.raises(ArrayError, match="differ"):
         flatland.light_from_brdf(np.zeros((3, 3)), np.zeros((3, 5)))

@@ -79,7 +79,7 @@ def test_rh_3_51_mended_stays_within_what_is_printed(sigma):
 
 
 def lobe_about_the_mirror_direction(sigma, cosine):
-    """exp(-(theta_h/sigma)^2) / (4 pi sigma^2 c) at angles t from the mirror direction: t, its solid angle, wi, lobe."""
+    """exp(-(theta_h/sigma)^2) / (4 pi sigma^2 c), t away from the mirror direction: t, its solid angle, wi, lobe."""
     nodes, weights = np.polynomial.legendre.leggauss(160)
     end = min(math.pi, 24 * sigma)
     t, phi = (nodes[:, None] + 1) * (end / 2), (np.arange(160) + 0.5) * (2 * math.pi / 160)
@@ -106,7 +106,7 @@ def test_rh_3_53_mended_is_the_lobe_averaged_about_the_mirror_direction(sigma, c
 
 
 def test_the_horizon_takes_from_wide_lobes_what_the_docstring_says():
-    t, measure, wi, lobe = lobe_about_the_mirror_direction(0.2, 0.5)
+    _, measure, wi, lobe = lobe_about_the_mirror_direction(0.2, 0.5)
     seen = np.sum(measure * np.where(wi[..., 2] > 0, lobe, 0))
     assert zonal.microfacet(0, 0.2, 0.5)[0] - seen == pytest.approx(0.015, abs=1e-3)
 

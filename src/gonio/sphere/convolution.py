@@ -14,6 +14,7 @@ Layouts, C channels last or absent:
     field        ((F+1)^2, P+1, Q+1) or (..., C)        B_lmpq, q = 0..Q, B_lmp,-q = B_lmpq
     anisotropic  transfer ((F+1)^2, (P+1)^2[, C]); field (count of (l, m, n), (P+1)^2[, C]), l by l, m slower than n
 Where p is replaced by samples of theta_o (2.57), f_l,-q = (-1)^q f_lq. Coefficients of BRDFs: `brdf/harmonic.py`.
+Arrays of other libraries are answered in kind, but for `factor`, which rests on decompositions.
 """
 
 from __future__ import annotations
@@ -23,10 +24,10 @@ import math
 
 import numpy as np
 
-from ..arrays import Array
+from ..arrays import Array, floats, is_numpy, like, namespace
 from ..directions import require_unit
 from ..errors import ArrayError, ParameterError
-from .harmonics import complex_harmonics, degree_of, degrees_and_orders
+from .harmonics import complex_harmonics, degree_of, degrees_and_orders, power_spectrum
 from .wigner import big_lambda, wigner_D
 
 
@@ -34,8 +35,8 @@ from .wigner import big_lambda, wigner_D
 class Deconvolved:
     """`value`, zero where it cannot be known, and `known`: for each degree l (and channel) whether it can."""
 
-    value: np.ndarray
-    known: np.ndarray
+    value: Array
+    known: Array
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -50,68 +51,74 @@ class Factored:
     known: np.ndarray
 
 
-def reflect(light: Array, transfer: Array) -> np.ndarray:
+def reflect(light: Array, transfer: Array) -> Array:
     """B_lmpq of an isotropic BRDF: RH 2.55, 2.59 where `transfer` holds both cosines, 2.57 where axis 1 is theta_o.
 
     Degrees that `transfer` lacks, or `light` lacks, are zero and left out: F is the lower of the two.
     """
-    light, transfer = _coefficients(light, 1), _coefficients(transfer, 3)
+    xp = namespace(light, transfer)
+    light, transfer = _coefficients(xp, light, 1), _coefficients(xp, transfer, 3)
     degree = min(degree_of(light), transfer.shape[0] - 1)
-    l, _ = degrees_and_orders(degree)
-    light, transfer = _with_channels(light[: l.size], transfer, 1, 3)
-    field: np.ndarray = _spread(big_lambda(degree)[l], transfer.ndim) * _spread(light, transfer.ndim) * transfer[l]
-    return field
+    l = _degrees(light, degree)
+    light, transfer = _with_channels(light[: (degree + 1) ** 2, ...], transfer, 1, 3)
+    scale = like(big_lambda(degree)[degrees_and_orders(degree)[0]], xp.real(transfer))
+    return _spread(scale, transfer.ndim) * _spread(light, transfer.ndim) * xp.take(transfer, l, axis=0)
 
 
-def reflect_anisotropic(light: Array, transfer: Array) -> np.ndarray:
+def reflect_anisotropic(light: Array, transfer: Array) -> Array:
     """B_lmnpq of any BRDF: RH 2.43; or 2.44 where axis 1 of `transfer`, the (p, q), is any set of exit directions."""
-    light, transfer = _coefficients(light, 1), _coefficients(transfer, 2)
+    xp = namespace(light, transfer)
+    light, transfer = _coefficients(xp, light, 1), _coefficients(xp, transfer, 2)
     degree = min(degree_of(light), degree_of(transfer))
     light, transfer = _with_channels(light, transfer, 1, 2)
     blocks = []
     for l in range(degree + 1):
         part = slice(l * l, (l + 1) ** 2)
         scale = math.sqrt(8 * math.pi**2 / (2 * l + 1))
-        product = scale * light[part][:, None, None] * transfer[None, part]
-        blocks.append(product.reshape(-1, *transfer.shape[1:]))
-    return np.concatenate(blocks)
+        product = scale * light[part, ...][:, None, None, ...] * transfer[None, part, ...]
+        blocks.append(product.reshape(-1, *product.shape[2:]))
+    return xp.concat(blocks, axis=0)
 
 
-def radiance(field: Array, alpha: Array, beta: Array, wo: Array) -> np.ndarray:
+def radiance(field: Array, alpha: Array, beta: Array, wo: Array) -> Array:
     """B at normals (alpha, beta) and local exit directions wo (..., 3), broadcast -> (...) or (..., C). RH 2.54.
 
     Angles in radians. The field is complex only by rounding where light and BRDF are real; the real part is returned.
     """
-    field = _coefficients(field, 3)
+    xp = namespace(field, alpha, beta, wo)
+    field = _coefficients(xp, field, 3)
     degree, exit_degree, highest = degree_of(field), field.shape[1] - 1, field.shape[2] - 1
-    alpha, beta, wo, shape = _points(alpha, beta, wo)
+    dtype, field = xp.real(field).dtype, xp.astype(field, xp.complex128)
+    (alpha, beta), wo, shape = _points(field, wo, alpha, beta)
     harmonic = complex_harmonics(exit_degree, wo)
-    total: np.ndarray = np.zeros((len(alpha), *field.shape[3:]))
+    total = xp.zeros((alpha.shape[0], *field.shape[3:]), dtype=xp.float64, device=field.device)
     for l in range(degree + 1):
-        D = wigner_D(l, alpha, beta) / big_lambda(l)[l]
-        part = field[l * l : (l + 1) ** 2]
+        D = wigner_D(l, alpha, beta) * math.sqrt((2 * l + 1) / (4 * math.pi))
+        part = field[l * l : (l + 1) ** 2, ...]
         for q in range(-min(l, highest), min(l, highest) + 1):
-            orders = [p * (p + 1) + q for p in range(abs(q), exit_degree + 1)]
-            exits = np.einsum("kp,mp...->km...", harmonic[:, orders], part[:, abs(q) :, abs(q)])
-            total = total + np.einsum("km,km...->k...", D[:, :, l + q], exits).real
-    return total.reshape((*shape, *field.shape[3:]))
+            orders = xp.asarray([p * (p + 1) + q for p in range(abs(q), exit_degree + 1)], device=field.device)
+            exits = xp.tensordot(xp.take(harmonic, orders, axis=1), part[:, abs(q) :, abs(q), ...], axes=([1], [1]))
+            total = total + xp.real(xp.sum(_meet(D[:, :, l + q], exits) * exits, axis=1))
+    return xp.astype(total.reshape((*shape, *field.shape[3:])), dtype)
 
 
-def radiance_anisotropic(field: Array, alpha: Array, beta: Array, gamma: Array, wo: Array) -> np.ndarray:
+def radiance_anisotropic(field: Array, alpha: Array, beta: Array, gamma: Array, wo: Array) -> Array:
     """B in frames R_z(beta) R_y(alpha) R_z(gamma) towards local wo (..., 3): (...) or (..., C). RH 2.42."""
-    field = _coefficients(field, 2)
-    exit_degree = degree_of(field[0])
-    alpha, beta, gamma, wo, shape = _points(alpha, beta, wo, gamma)
+    xp = namespace(field, alpha, beta, gamma, wo)
+    field = _coefficients(xp, field, 2)
+    degree, exit_degree = _degree_of_field(field), degree_of(field[0, ...])
+    dtype, field = xp.real(field).dtype, xp.astype(field, xp.complex128)
+    (alpha, beta, gamma), wo, shape = _points(field, wo, alpha, beta, gamma)
     harmonic = complex_harmonics(exit_degree, wo)
-    total: np.ndarray = np.zeros((len(alpha), *field.shape[2:]))
+    total = xp.zeros((alpha.shape[0], *field.shape[2:]), dtype=xp.float64, device=field.device)
     start = 0
-    for l in range(_degree_of_field(field) + 1):
+    for l in range(degree + 1):
         n = 2 * l + 1
-        D = wigner_D(l, alpha, beta, gamma).reshape(len(alpha), -1) * math.sqrt(n / (8 * math.pi**2))
-        exits = np.einsum("kp,mp...->km...", harmonic, field[start : start + n * n])
-        total = total + np.einsum("km,km...->k...", D, exits).real
+        D = wigner_D(l, alpha, beta, gamma).reshape(-1, n * n) * math.sqrt(n / (8 * math.pi**2))
+        exits = xp.tensordot(harmonic, field[start : start + n * n, ...], axes=([1], [1]))
+        total = total + xp.real(xp.sum(_meet(D, exits) * exits, axis=1))
         start += n * n
-    return total.reshape((*shape, *field.shape[2:]))
+    return xp.astype(total.reshape((*shape, *field.shape[2:])), dtype)
 
 
 def brdf_from_light(field: Array, light: Array, level: float = 1e-6) -> Deconvolved:
@@ -120,17 +127,18 @@ def brdf_from_light(field: Array, light: Array, level: float = 1e-6) -> Deconvol
     All m of a degree serve, by least squares, since any may vanish. A degree whose light lies below `level` of the
     strongest, the root of the sum over m of abs(L_lm)^2, says nothing about the BRDF: it is masked.
     """
-    field, light = _coefficients(field, 3), _coefficients(light, 1)
+    xp = namespace(field, light)
+    field, light = _coefficients(xp, field, 3), _coefficients(xp, light, 1)
     degree = _common_degree(field, light)
     light, field = _with_channels(light, field, 1, 3)
-    value: np.ndarray = np.zeros((degree + 1, *field.shape[1:]))
-    energy = _by_degree(np.abs(light) ** 2, degree)
-    known = _above(np.sqrt(energy), level)
-    for l in range(degree + 1):
-        part = slice(l * l, (l + 1) ** 2)
-        inner = np.sum(np.conj(_spread(light[part], field.ndim)) * field[part], axis=0).real
-        value[l] = np.where(known[l], inner / np.where(known[l], big_lambda(l)[l] * energy[l], 1), 0)
-    return Deconvolved(value, known)
+    energy = power_spectrum(light)
+    known = _above(xp, xp.sqrt(energy), level)
+    scale = _meet(like(big_lambda(degree), energy), energy)
+    divisor = xp.where(known, scale * energy, xp.ones_like(energy))
+    products = xp.real(xp.conj(_spread(light, field.ndim)) * field)
+    inner = [xp.sum(products[l * l : (l + 1) ** 2, ...], axis=0) for l in range(degree + 1)]
+    value = xp.stack(inner, axis=0) / _spread(divisor, field.ndim)
+    return Deconvolved(xp.where(_spread(known, field.ndim), value, xp.zeros_like(value)), known)
 
 
 def light_from_brdf(field: Array, transfer: Array, level: float = 1e-6) -> Deconvolved:
@@ -139,18 +147,23 @@ def light_from_brdf(field: Array, transfer: Array, level: float = 1e-6) -> Decon
     All (p, q) serve, by least squares. A degree that the BRDF passes with less than `level` of its strongest, the
     root of the sum over p, q of rho_lpq^2, is lost in reflection (odd l > 1 of Lambert's): it is masked.
     """
-    field, transfer = _coefficients(field, 3), _coefficients(transfer, 3)
+    xp = namespace(field, transfer)
+    field, transfer = _coefficients(xp, field, 3), _coefficients(xp, transfer, 3)
     degree = degree_of(field)
-    if transfer.shape[:3] != (degree + 1, *field.shape[1:3]):
-        raise ArrayError(f"transfer has shape {transfer.shape}, which does not meet the field's {field.shape}.")
+    if tuple(transfer.shape[:3]) != (degree + 1, *field.shape[1:3]):
+        raise ArrayError(
+            f"transfer has shape {tuple(transfer.shape)}, which does not meet the field's {tuple(field.shape)}."
+        )
     field, transfer = _with_channels(field, transfer, 3, 3)
-    weight = _both_signs(transfer.shape[2], transfer.ndim)
-    energy = np.sum(weight * np.abs(transfer) ** 2, axis=(1, 2))
-    known = _above(np.sqrt(energy), level)
-    l, _ = degrees_and_orders(degree)
-    inner = np.sum(weight * np.conj(transfer)[l] * field, axis=(1, 2))
-    divisor = np.where(known, _spread(big_lambda(degree), energy.ndim) * energy, 1)
-    return Deconvolved(np.where(known[l], inner / divisor[l], 0), known)
+    weight = like(_both_signs(transfer.shape[2], transfer.ndim), xp.real(transfer))
+    energy = xp.sum(weight * xp.abs(transfer) ** 2, axis=(1, 2))
+    known = _above(xp, xp.sqrt(energy), level)
+    l = _degrees(field, degree)
+    inner = xp.sum(weight * xp.take(xp.conj(transfer), l, axis=0) * field, axis=(1, 2))
+    scale = _meet(like(big_lambda(degree), energy), energy)
+    divisor = xp.where(known, scale * energy, xp.ones_like(energy))
+    value = inner / xp.take(divisor, l, axis=0)
+    return Deconvolved(xp.where(xp.take(known, l, axis=0), value, xp.zeros_like(value)), known)
 
 
 def factor(field: Array, level: float = 1e-6) -> Factored:
@@ -163,10 +176,11 @@ def factor(field: Array, level: float = 1e-6) -> Factored:
     Degrees that no chain of pairs stronger than `level` of the strongest ties to l = 0 are masked: those of a mirror
     (all but 0), and those above P. Raises `ArrayError` where there is no light at l = 0.
     """
-    field = _coefficients(field, 3)
+    if not is_numpy(field):
+        raise ArrayError("factor takes NumPy arrays; `gonio.arrays.to_numpy` makes them.")
+    field = _coefficients(np, field, 3)
     if field.ndim == 3:
-        one = _factor(field, level)
-        return Factored(one.light, one.transfer, one.known)
+        return _factor(field, level)
     each = [_factor(field[..., c], level) for c in range(field.shape[-1])]
     light, transfer, known = (
         np.stack([getattr(one, name) for one in each], axis=-1) for name in ("light", "transfer", "known")
@@ -232,44 +246,44 @@ def _both_signs(count: int, ndim: int) -> np.ndarray:
     return weight
 
 
-def _by_degree(values: np.ndarray, degree: int) -> np.ndarray:
-    sums: np.ndarray = np.stack([np.sum(values[l * l : (l + 1) ** 2], axis=0) for l in range(degree + 1)])
-    return sums
-
-
-def _above(strength: np.ndarray, level: float) -> np.ndarray:
+def _above(xp: Array, strength: Array, level: float) -> Array:
     if not 0 < level < 1:
         raise ParameterError(f"level = {level:.6g} is not in (0, 1).")
-    above: np.ndarray = (strength > level * np.max(strength, axis=0)) & (strength > 0)
-    return above
+    return (strength > level * xp.max(strength, axis=0)) & (strength > 0)
 
 
-def _coefficients(given: Array, axes: int) -> np.ndarray:
-    x: np.ndarray = np.asarray(given)
-    if x.ndim not in (axes, axes + 1) or x.dtype.kind not in "fiuc":
+def _coefficients(xp: Array, given: Array, axes: int) -> Array:
+    x = xp.asarray(given) if is_numpy(given) else given
+    if x.ndim not in (axes, axes + 1) or not xp.isdtype(x.dtype, "numeric"):
         raise ArrayError(
-            f"coefficients have shape {x.shape}, dtype {x.dtype}; expected {axes} axes, and one of channels."
+            f"coefficients have shape {tuple(x.shape)}, dtype {x.dtype}; expected {axes} axes, and one of channels."
         )
-    if not np.all(np.isfinite(x)):
+    x = xp.astype(x, xp.float64) if xp.isdtype(x.dtype, "integral") else x
+    if not bool(xp.all(xp.isfinite(x))):
         raise ArrayError("coefficients are not all finite. Mask or mend such entries before passing them.")
     return x
 
 
-def _degree_of_field(field: np.ndarray) -> int:
+def _degrees(x: Array, degree: int) -> Array:
+    """l of each coefficient, to take entries of arrays such as `x` by."""
+    return namespace(x).asarray(degrees_and_orders(degree)[0], device=x.device)
+
+
+def _degree_of_field(field: Array) -> int:
     degree = int(np.cbrt(0.75 * field.shape[0]) + 0.5) - 1
     if (degree + 1) * (2 * degree + 1) * (2 * degree + 3) != 3 * field.shape[0]:
-        raise ArrayError(f"an anisotropic field has shape {field.shape}; axis 0 holds 1, 10, 35, ... (l, m, n).")
+        raise ArrayError(f"an anisotropic field has shape {tuple(field.shape)}; axis 0 holds 1, 10, 35, ... (l, m, n).")
     return degree
 
 
-def _common_degree(field: np.ndarray, light: np.ndarray) -> int:
+def _common_degree(field: Array, light: Array) -> int:
     degree = degree_of(field)
     if degree_of(light) != degree:
         raise ArrayError(f"light has degree {degree_of(light)}, the field {degree}; cut the higher one.")
     return degree
 
 
-def _with_channels(a: np.ndarray, b: np.ndarray, axes_a: int, axes_b: int) -> tuple[np.ndarray, np.ndarray]:
+def _with_channels(a: Array, b: Array, axes_a: int, axes_b: int) -> tuple[Array, Array]:
     """Both with channels where either has them."""
     if a.ndim > axes_a or b.ndim > axes_b:
         a, b = (x[..., None] if x.ndim == axes else x for x, axes in ((a, axes_a), (b, axes_b)))
@@ -278,18 +292,20 @@ def _with_channels(a: np.ndarray, b: np.ndarray, axes_a: int, axes_b: int) -> tu
     return a, b
 
 
-def _spread(x: np.ndarray, ndim: int) -> np.ndarray:
-    """(N,) or (N, C) -> (N, 1, ..., 1[, C]) of `ndim` axes, where ndim > 3 has channels."""
-    if x.ndim == 1:
-        return x.reshape(-1, *(1,) * (ndim - 1))
-    return x.reshape(x.shape[0], *(1,) * (ndim - 2), x.shape[1])
+def _spread(x: Array, ndim: int) -> Array:
+    """(N,) or (N, C) -> (N, 1, ..., 1[, C]) of `ndim` axes."""
+    return x.reshape(x.shape[0], *(1,) * (ndim - x.ndim), *x.shape[1:])
 
 
-def _points(alpha: Array, beta: Array, wo: Array, gamma: Array | None = None) -> tuple[Array, ...]:
-    """Flat float64 angles and directions, and the shape they broadcast to."""
+def _meet(x: Array, other: Array) -> Array:
+    """`x` with as many axes as `other`, the new ones last."""
+    return x.reshape(*x.shape, *(1,) * (other.ndim - x.ndim))
+
+
+def _points(field: Array, wo: Array, *angles: Array) -> tuple[list[Array], Array, tuple[int, ...]]:
+    """Flat float64 angles and directions of the field's library, and the shape they broadcast to."""
     require_unit(wo, "wo")
-    wo = np.asarray(wo, dtype=np.float64)
-    angles = [np.asarray(a, dtype=np.float64) for a in (alpha, beta, gamma) if a is not None]
-    shape = np.broadcast_shapes(*(a.shape for a in angles), wo.shape[:-1])
-    flat = (np.broadcast_to(a, shape).reshape(-1) for a in angles)
-    return *flat, np.broadcast_to(wo, (*shape, 3)).reshape(-1, 3), shape
+    xp, _, wo, *around = floats(field.real, wo, *angles)
+    shape = np.broadcast_shapes(*(tuple(a.shape) for a in around), tuple(wo.shape[:-1]))
+    flat = [xp.astype(xp.broadcast_to(a, shape).reshape(-1), xp.float64) for a in around]
+    return flat, xp.astype(xp.broadcast_to(wo, (*shape, 3)).reshape(-1, 3), xp.float64), shape

@@ -6,7 +6,7 @@
     B_lp = sqrt(2 pi) L_l rho_lp,    B_l(theta_o) = sqrt(2 pi) L_l rho_l(theta_o)                       (RH 2.24, 2.25)
 
 Orders k = -degree..degree ascending, 2 degree + 1 of them. Angles in radians, local ones from the normal; a BRDF is
-zero beyond pi/2 on either side. Space: `convolution.py`.
+zero beyond pi/2 on either side. Arrays of other libraries are answered in kind. Space: `convolution.py`.
 """
 
 from __future__ import annotations
@@ -16,31 +16,32 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ..arrays import Array
+from ..arrays import Array, floats, is_numpy, like, namespace
 from ..errors import ArrayError, ParameterError
 from .convolution import Deconvolved
 from .harmonics import require_degree
 
 
-def analysis(values: Array, degree: int) -> np.ndarray:
+def analysis(values: Array, degree: int) -> Array:
     """f_k, (2 degree + 1,), from f at theta = -pi + 2 pi j / N, j = 0..N-1. Exact where N > 2 degree bounds f. RH 2.17.
 
     Raises `ArrayError` where N <= 2 degree: then orders could not be told apart.
     """
     require_degree(degree)
-    values = np.asarray(values)
-    if values.ndim != 1 or len(values) <= 2 * degree:
-        raise ArrayError(f"values have shape {values.shape}; degree {degree} needs (N,), N > {2 * degree}.")
-    theta = -math.pi + 2 * math.pi / len(values) * np.arange(len(values))
-    coefficients: np.ndarray = np.conj(_waves(degree, theta)).T @ values * (2 * math.pi / len(values))
-    return coefficients
+    xp = namespace(values)
+    values = _complex(xp, values)
+    count = values.shape[0] if values.ndim else 0
+    if values.ndim != 1 or count <= 2 * degree:
+        raise ArrayError(f"values have shape {tuple(values.shape)}; degree {degree} needs (N,), N > {2 * degree}.")
+    theta = like(-math.pi + 2 * math.pi / count * np.arange(count), xp.real(values))
+    return xp.conj(_waves(degree, theta)).T @ values * (2 * math.pi / count)
 
 
-def synthesis(coefficients: Array, theta: Array) -> np.ndarray:
+def synthesis(coefficients: Array, theta: Array) -> Array:
     """f(theta), (...) complex, from f_k. RH 2.17."""
-    coefficients = np.asarray(coefficients)
-    values: np.ndarray = _waves(_degree_of(coefficients), np.asarray(theta)) @ coefficients
-    return values
+    xp = namespace(coefficients, theta)
+    coefficients = _complex(xp, coefficients)
+    return _waves(_degree_of(coefficients), like(theta, xp.real(coefficients))) @ coefficients
 
 
 def transfer(
@@ -63,56 +64,73 @@ def transfer(
     return coefficients
 
 
-def reflect(light: Array, transfer: Array) -> np.ndarray:
+def reflect(light: Array, transfer: Array) -> Array:
     """B_lp from L_l (2F+1,) and rho_lp (2F+1, 2P+1), RH 2.24; or B_l(theta_o) from rho_l(theta_o) (2F+1, K), 2.25."""
-    light, transfer = np.asarray(light), np.asarray(transfer)
-    _require_pair(light, transfer, "transfer")
-    field: np.ndarray = math.sqrt(2 * math.pi) * light[:, None] * transfer
-    return field
+    _, light, transfer = _pair(light, transfer, "transfer")
+    return math.sqrt(2 * math.pi) * light[:, None] * transfer
 
 
-def radiance(field: Array, alpha: Array, theta_o: Array) -> np.ndarray:
+def radiance(field: Array, alpha: Array, theta_o: Array) -> Array:
     """B(alpha, theta_o), (...) complex, of B_lp at normals alpha and exit angles theta_o, broadcast. RH 2.20."""
-    field = np.asarray(field)
-    alpha, theta_o = np.broadcast_arrays(alpha, theta_o)
-    waves = _waves(_degree_of(field), alpha), _waves(_degree_of(field[0]), theta_o)
-    values: np.ndarray = np.einsum("...l,lp,...p->...", waves[0], field, waves[1])
-    return values
+    xp = namespace(field, alpha, theta_o)
+    field = _complex(xp, field)
+    if field.ndim != 2:
+        raise ArrayError(f"field has shape {tuple(field.shape)}; it is (2F+1, 2P+1).")
+    alpha, theta_o = xp.broadcast_arrays(*(like(angle, xp.real(field)) for angle in (alpha, theta_o)))
+    at_normals = _waves(_degree_of(field), alpha) @ field
+    return xp.sum(at_normals * _waves(_degree_of(field[0, :]), theta_o), axis=-1)
 
 
 def brdf_from_light(field: Array, light: Array, level: float = 1e-6) -> Deconvolved:
     """rho_lp = B_lp / (sqrt(2 pi) L_l), masked at orders where abs(L_l) is below `level` of the largest."""
-    field, light = np.asarray(field), np.asarray(light)
-    _require_pair(light, field, "field")
-    known = np.abs(light) > level * np.max(np.abs(light))
-    divisor = math.sqrt(2 * math.pi) * np.where(known, light, 1)
-    return Deconvolved(np.where(known[:, None], field / divisor[:, None], 0), known)
+    xp, light, field = _pair(light, field, "field")
+    known = xp.abs(light) > level * xp.max(xp.abs(light))
+    divisor = math.sqrt(2 * math.pi) * xp.where(known, light, xp.ones_like(light))
+    return Deconvolved(xp.where(known[:, None], field / divisor[:, None], xp.zeros_like(field)), known)
 
 
 def light_from_brdf(field: Array, transfer: Array, level: float = 1e-6) -> Deconvolved:
     """L_l by least squares over p, masked at orders that the BRDF passes with less than `level` of the strongest."""
-    field, transfer = np.asarray(field), np.asarray(transfer)
+    xp = namespace(field, transfer)
+    field, transfer = _complex(xp, field), _complex(xp, transfer)
     if field.ndim != 2 or field.shape != transfer.shape:
-        raise ArrayError(f"field {field.shape} and transfer {transfer.shape} differ in shape, or are not (2F+1, 2P+1).")
-    energy = np.sum(np.abs(transfer) ** 2, axis=1)
-    known = np.sqrt(energy) > level * np.sqrt(np.max(energy))
-    divisor = math.sqrt(2 * math.pi) * np.where(known, energy, 1)
-    return Deconvolved(np.where(known, np.sum(np.conj(transfer) * field, axis=1) / divisor, 0), known)
+        raise ArrayError(
+            f"field {tuple(field.shape)} and transfer {tuple(transfer.shape)} differ in shape, or are not (2F+1, 2P+1)."
+        )
+    energy = xp.sum(xp.abs(transfer) ** 2, axis=1)
+    known = xp.sqrt(energy) > level * xp.sqrt(xp.max(energy))
+    divisor = math.sqrt(2 * math.pi) * xp.where(known, energy, xp.ones_like(energy))
+    value = xp.sum(xp.conj(transfer) * field, axis=1) / divisor
+    return Deconvolved(xp.where(known, value, xp.zeros_like(value)), known)
 
 
-def _waves(degree: int, theta: np.ndarray) -> np.ndarray:
+def _waves(degree: int, theta: Array) -> Array:
     """F_k(theta): (..., 2 degree + 1)."""
-    waves: np.ndarray = np.exp(1j * theta[..., None] * np.arange(-degree, degree + 1)) / math.sqrt(2 * math.pi)
-    return waves
+    xp, theta = floats(theta)
+    phase = theta[..., None] * like(np.arange(-degree, degree + 1.0), theta)
+    return (xp.cos(phase) + 1j * xp.sin(phase)) / math.sqrt(2 * math.pi)
 
 
-def _degree_of(coefficients: np.ndarray) -> int:
-    if coefficients.ndim == 0 or len(coefficients) % 2 == 0:
-        raise ArrayError(f"coefficients have shape {coefficients.shape}; orders -degree..degree are an odd number.")
-    return len(coefficients) // 2
+def _complex(xp: Array, x: Array) -> Array:
+    """`x`, complex: products of real and complex arrays are not for every library."""
+    x = xp.asarray(x) if is_numpy(x) else x
+    single = x.dtype in (xp.float32, xp.complex64)
+    return xp.astype(x, xp.complex64 if single else xp.complex128)
 
 
-def _require_pair(light: np.ndarray, other: np.ndarray, name: str) -> None:
+def _degree_of(coefficients: Array) -> int:
+    if coefficients.ndim == 0 or coefficients.shape[0] % 2 == 0:
+        shape = tuple(coefficients.shape)
+        raise ArrayError(f"coefficients have shape {shape}; orders -degree..degree are an odd number.")
+    return int(coefficients.shape[0]) // 2
+
+
+def _pair(light: Array, other: Array, name: str) -> tuple[Array, Array, Array]:
+    """The namespace, and both complex; refused where their orders do not meet."""
+    xp = namespace(light, other)
+    light, other = _complex(xp, light), _complex(xp, other)
     _degree_of(light)
-    if light.ndim != 1 or other.ndim != 2 or len(light) != len(other):
-        raise ArrayError(f"light {light.shape} and {name} {other.shape} do not meet: (2F+1,) and (2F+1, K).")
+    if light.ndim != 1 or other.ndim != 2 or light.shape[0] != other.shape[0]:
+        shapes = f"light {tuple(light.shape)} and {name} {tuple(other.shape)}"
+        raise ArrayError(f"{shapes} do not meet: (2F+1,) and (2F+1, K).")
+    return xp, light, other
