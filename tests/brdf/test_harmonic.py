@@ -5,7 +5,7 @@ import pytest
 
 import gonio as gn
 from gonio.brdf import harmonic
-from gonio.errors import ParameterError
+from gonio.errors import ArrayError, ParameterError
 from gonio.sphere import zonal
 from gonio.sphere.harmonics import complex_harmonics
 from gonio.sphere.wigner import big_lambda
@@ -96,6 +96,17 @@ def test_uniform_light_finds_the_mean_of_the_lobe():  # RH 3.21, 3.22 mended
 def test_a_mirror_is_one_on_the_diagonal_with_turned_azimuth():  # RH 3.23
     rho = harmonic.mirror(3)
     assert rho[2, 2, 1] == -1 and rho[3, 3, 2] == 1 and rho[1, 1, 2] == 0 and rho[2, 1, 0] == 0
+
+
+def test_tensors_are_refused_not_cut_from_their_gradients():
+    torch = pytest.importorskip("torch")
+    glossy = gn.Lambert(0.2) + gn.Microfacet(gn.GGX(torch.tensor(0.3)), gn.Fresnel(1.5))
+    with pytest.raises(ArrayError, match="alpha"):
+        harmonic.transfer(glossy, 2, 2)
+    with pytest.raises(ArrayError, match="alpha"):
+        harmonic.anisotropic_transfer(glossy, 2, 2)
+    with pytest.raises(ArrayError, match="theta_o"):
+        harmonic.transfer_at(gn.Lambert(0.5), 2, torch.tensor([0.3]))
 
 
 def test_bad_input_is_refused():
