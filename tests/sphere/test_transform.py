@@ -192,6 +192,21 @@ def test_kernels_agree_with_the_plain_recursion(recursion, rng):
     close(recursion.table(3)[: recursion.count[3]], table[: recursion.count[3]], atol=1e-13)
 
 
+@compiled
+@pytest.mark.parametrize(("degree", "spin"), [(300, None), (300, 0), (300, 3), (700, None)])
+def test_what_the_kernels_leave_out_is_negligible(degree, spin):
+    # Of values that reach sqrt(degree): no digit of a float64, to spare.
+    grid = GaussLegendre(degree)
+    recursion = folded_recursion(grid, degree) if spin is None else spin_recursion(grid, degree, spin)
+    skipped = 0
+    for m in range(0, degree + 1, 50):
+        table, first, stop = recursion.table(m), recursion.first[m], recursion.stop[m]
+        skipped += table.shape[1] - (stop - first)
+        outside = np.concatenate((table[:, :first], table[:, stop:]), axis=1)
+        assert np.max(np.abs(outside), initial=0) < 1e-20
+    assert skipped > 0
+
+
 @pytest.mark.parametrize(("rows", "width"), [(6, 5), (7, 5), (2, 1030)])
 def test_kernels_of_few_degrees_agree_with_the_plain_sums(rows, width, rng):
     half, plane = (rows + 1) // 2, np.array([0, 3, 1, 2, 0])

@@ -17,7 +17,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-BLOCK = 128  # rings: eight steps of them and the sums of a dozen channels fit a first cache of 32 KiB
+BLOCK = 1024  # bytes of rings: eight steps of them and the sums of a dozen channels fit a first cache of 32 KiB
 EIGHT = 8
 LANES = 32  # rings are taken in multiples of this, so that vectorised loops leave no remainder
 _LIFT = 2.0**-512
@@ -134,10 +134,11 @@ def synthesise(coefficients, start, level, a, b, scale, count, first, stop, t, r
     its range of rings; the others become 0. t: (rings,); `rings` may be longer.
     """
     channels = rings.shape[1]
-    steps = np.empty((EIGHT, BLOCK), rings.dtype)
-    sums = np.empty((channels, BLOCK), rings.dtype)
+    block = BLOCK // rings.itemsize
+    steps = np.empty((EIGHT, block), rings.dtype)
+    sums = np.empty((channels, block), rings.dtype)
     weights = np.empty((channels, a.shape[1]), rings.dtype)
-    x, last, now, deep = np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK, np.int64)
+    x, last, now, deep = np.empty(block), np.empty(block), np.empty(block), np.empty(block, np.int64)
     for m in range(rings.shape[0]):
         for i in range(a.shape[1]):
             for k in range(channels):
@@ -145,8 +146,8 @@ def synthesise(coefficients, start, level, a, b, scale, count, first, stop, t, r
         begin = first[m] // LANES * LANES
         rings[m, :, :begin] = 0
         rings[m, :, stop[m] :] = 0
-        for low in range(begin, stop[m], BLOCK):
-            n = min(BLOCK, stop[m] - low)
+        for low in range(begin, stop[m], block):
+            n = min(block, stop[m] - low)
             whole = (n + LANES - 1) // LANES * LANES
             ready = _begin(start, level, t, m, low, whole, (x, last, now, deep))
             sums[:, :whole] = 0
@@ -164,15 +165,16 @@ def synthesise(coefficients, start, level, a, b, scale, count, first, stop, t, r
 def analyse(rings, start, level, a, b, scale, count, first, stop, t, coefficients):  # type: ignore[no-untyped-def]
     """Fill `coefficients` (orders, steps, channels) from `rings` (orders, channels, rings): `synthesise` transposed."""
     channels = rings.shape[1]
-    steps = np.empty((EIGHT, BLOCK), rings.dtype)
-    values = np.empty((channels, BLOCK), rings.dtype)
+    block = BLOCK // rings.itemsize
+    steps = np.empty((EIGHT, block), rings.dtype)
+    values = np.empty((channels, block), rings.dtype)
     weights = np.empty((channels, a.shape[1]), rings.dtype)
-    x, last, now, deep = np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK, np.int64)
+    x, last, now, deep = np.empty(block), np.empty(block), np.empty(block), np.empty(block, np.int64)
     zero = rings.dtype.type(0)
     for m in range(rings.shape[0]):
         weights[:] = 0
-        for low in range(first[m] // LANES * LANES, stop[m], BLOCK):
-            n = min(BLOCK, stop[m] - low)
+        for low in range(first[m] // LANES * LANES, stop[m], block):
+            n = min(block, stop[m] - low)
             whole = (n + LANES - 1) // LANES * LANES
             ready = _begin(start, level, t, m, low, whole, (x, last, now, deep))
             values[:, :n] = rings[m, :, low : low + n]
@@ -191,7 +193,7 @@ def analyse(rings, start, level, a, b, scale, count, first, stop, t, coefficient
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def tabulate(start, level, a, b, scale, t, table):  # type: ignore[no-untyped-def]
-    """Fill `table` (steps, rings) with scale_i P_i(t_r) of one order: start, level, t (rings,), a, b, scale (steps,)."""
+    """Fill `table` (steps, rings) with scale_i P_i(t_r) of one order: start, level, t (rings,); the others (steps,)."""
     for r in range(t.size):
         last, now, deep = 0.0, start[r], level[r]
         for i in range(table.shape[0]):

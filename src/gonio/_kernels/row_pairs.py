@@ -20,7 +20,7 @@ _FAST = {"contract", "nsz"}
 
 @njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
 def gather(image, weights, low, lines):  # type: ignore[no-untyped-def]
-    """Fill `lines` from `image` (rows, columns C), from the pair `low` on, times weights (2, pairs) of sums, differences.
+    """Fill `lines` from `image` (rows, columns C), from the pair `low` on; both kinds times weights (2, pairs).
 
     The equator of odd rows is its own mirror image and comes twice.
     """
@@ -121,12 +121,12 @@ def collect(waves, low, rings):  # type: ignore[no-untyped-def]
     """Fill `rings` from the pair `low` on from waves (2 C, pairs, orders or more) = cos - i sin."""
     channels = waves.shape[0] // 2
     for k in range(waves.shape[0]):
-        part = k + k // channels * channels
+        cosine, sine = np.uintp(k + k // channels * channels), np.uintp(k + (k // channels + 1) * channels)
         for m in range(rings.shape[0]):
             for p in range(waves.shape[1]):
-                wave = waves[k, p, m]
-                rings[m, part, low + p] = wave.real
-                rings[m, part + channels, low + p] = -wave.imag
+                r = np.uintp(low) + np.uintp(p)
+                rings[m, cosine, r] = waves[k, p, m].real
+                rings[m, sine, r] = -waves[k, p, m].imag
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -135,7 +135,8 @@ def distribute(rings, low, waves):  # type: ignore[no-untyped-def]
     channels = waves.shape[0] // 2
     waves[:, :, rings.shape[0] :] = 0
     for k in range(waves.shape[0]):
-        part = k + k // channels * channels
+        cosine, sine = np.uintp(k + k // channels * channels), np.uintp(k + (k // channels + 1) * channels)
         for m in range(rings.shape[0]):
             for p in range(waves.shape[1]):
-                waves[k, p, m] = complex(rings[m, part, low + p], -rings[m, part + channels, low + p])
+                r = np.uintp(low) + np.uintp(p)
+                waves[k, p, m] = complex(rings[m, cosine, r], -rings[m, sine, r])

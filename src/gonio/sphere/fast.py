@@ -60,7 +60,8 @@ def _weights(grid: Grid) -> np.ndarray:
 
 
 def _kind(turn: np.ndarray, dtype: np.dtype) -> np.ndarray:
-    return turn.astype(np.complex64 if dtype == np.float32 else np.complex128)
+    result: np.ndarray = turn.astype(np.complex64 if dtype == np.float32 else np.complex128)
+    return result
 
 
 def _orders(degree: int, size: int) -> Iterator[slice]:

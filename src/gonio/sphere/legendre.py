@@ -131,16 +131,18 @@ def _recursion(
     scale = np.ones_like(g)
     for i in range(2, g.shape[1]):
         scale[:, i] = scale[:, i - 2] * g[:, i - 2] / g[:, i - 1]
-    a = scale / g
-    a[:, :-1] /= scale[:, 1:]
+    slope = scale / g
+    slope[:, :-1] /= scale[:, 1:]
     shape = degree + 1, -(-l.shape[1] // kernels.EIGHT) * kernels.EIGHT
     factors = []
-    for factor in (a, -centre * a, scale):
+    for factor in (slope, -centre * slope, scale):
         padded = np.zeros(shape)
         padded[:, : l.shape[1]] = np.where(inside, factor, 0)
         factors.append(padded)
     start, level = _start(theta, degree, spin, sign)
-    return Recursion(start, level, *factors, inside.sum(axis=1), *_range(theta, degree, spin), t)
+    first, stop = _range(theta, degree, spin)
+    a, b, scale = factors
+    return Recursion(start, level, a, b, scale, inside.sum(axis=1), first, stop, t)
 
 
 def _start(theta: np.ndarray, degree: int, spin: int, sign: bool) -> tuple[np.ndarray, np.ndarray]:
