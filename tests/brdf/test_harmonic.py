@@ -10,6 +10,16 @@ from gonio.sphere import zonal
 from gonio.sphere.harmonics import complex_harmonics
 from gonio.sphere.wigner import big_lambda
 
+
+class Polynomial(gn.brdf.model.BRDF):
+    """A cubic lobe about the mirror direction: every quadrature below integrates it exactly."""
+
+    def _f(self, xp, wi, wo):
+        mirrored = wi[..., 2] * wo[..., 2] - wi[..., 0] * wo[..., 0] - wi[..., 1] * wo[..., 1]
+        f = 0.1 + 0.3 * (1 + mirrored) ** 3
+        return xp.stack((f, 2 * f, f + 0.1 * mirrored), axis=-1)
+
+
 GLOSSY = gn.Lambert([0.3, 0.2, 0.1]) + gn.Microfacet(gn.GGX(0.5), gn.Fresnel(1.5))
 
 
@@ -30,22 +40,15 @@ def test_lamberts_coefficients_are_products_of_two_zonal_ones():
 
 
 def test_isotropic_coefficients_are_the_double_integral():  # RH 2.38, 2.53
-    found = harmonic.transfer(GLOSSY, 3, 2, samples=40)
-    w, measure = half_sphere(24)
-    f = GLOSSY.f(w[:, None], w) * w[:, None, 2:]
+    found = harmonic.transfer(Polynomial(), 3, 2)
+    w, measure = half_sphere(10)
+    f = Polynomial().f(w[:, None], w) * w[:, None, 2:]
     incident, leaving = complex_harmonics(3, w), np.conj(complex_harmonics(2, w))
     for l, p, q in [(0, 0, 0), (1, 1, 1), (3, 2, 1), (3, 2, 2), (2, 1, 0)]:
         for sign in (1, -1):
-            value = np.einsum(
-                "i,o,i,o,ioc->c",
-                measure,
-                measure,
-                incident[:, l * l + l + sign * q],
-                leaving[:, p * p + p + sign * q],
-                f,
-            )
-            # A GGX lobe, its grazing side above all, on 24 x 48 samples a side.
-            np.testing.assert_allclose(found[l, p, q], value, rtol=0, atol=3e-4)
+            i, o = incident[:, l * l + l + sign * q], leaving[:, p * p + p + sign * q]
+            value = np.einsum("i,o,ioc->c", measure * i, measure * o, f)
+            np.testing.assert_allclose(found[l, p, q], value, rtol=0, atol=1e-12)
 
 
 def test_holding_the_exit_angle_is_summing_over_p():  # RH 2.53 against 2.56
@@ -55,32 +58,31 @@ def test_holding_the_exit_angle_is_summing_over_p():  # RH 2.53 against 2.56
     expected = math.sqrt(2 * math.pi) * 0.5 / math.pi * zonal.clamped_cosine(4) / big_lambda(4)
     np.testing.assert_allclose(held[:, :, 0], np.repeat(expected[:, None], 2, axis=1), rtol=0, atol=1e-12)
     # Projected on Y_pq over the half sphere, the held coefficients are those of all p.
-    nodes, weights = np.polynomial.legendre.leggauss(30)
+    nodes, weights = np.polynomial.legendre.leggauss(12)
     z = (nodes + 1) / 2
-    held = harmonic.transfer_at(GLOSSY, 4, np.arccos(z), samples=40)
+    held = harmonic.transfer_at(Polynomial(), 4, np.arccos(z))
     leaving = complex_harmonics(4, np.stack((np.sqrt(1 - z * z), 0 * z, z), axis=-1)).real
-    found = harmonic.transfer(GLOSSY, 4, 4, samples=40)
+    found = harmonic.transfer(Polynomial(), 4, 4)
     for p, q in [(0, 0), (3, 1), (4, 2)]:
         value = math.sqrt(2 * math.pi) * np.einsum("k,k,lkc->lc", weights / 2, leaving[:, p * p + p + q], held[:, :, q])
-        np.testing.assert_allclose(found[:, p, q], value, rtol=0, atol=1e-4)
+        np.testing.assert_allclose(found[:, p, q], value, rtol=0, atol=1e-12)
 
 
 def test_both_cosines_make_reciprocal_brdfs_symmetric():  # RH 2.59
     rho = harmonic.transfer(GLOSSY, 5, 5, reciprocal=True)
     np.testing.assert_allclose(rho, np.swapaxes(rho, 0, 1), rtol=0, atol=1e-12)
     brushed = gn.Microfacet(gn.GGX(0.3, 0.6), gn.Fresnel(1.5))
-    rho = harmonic.anisotropic_transfer(brushed, 3, 3, reciprocal=True, samples=12)
+    rho = harmonic.anisotropic_transfer(brushed, 3, 3, reciprocal=True, samples=8)
     np.testing.assert_allclose(rho, np.conj(np.swapaxes(rho, 0, 1)), rtol=0, atol=1e-12)
 
 
 def test_isotropic_brdfs_have_n_equal_q():
-    rho = harmonic.anisotropic_transfer(GLOSSY, 2, 2, samples=16)
-    small = harmonic.transfer(GLOSSY, 2, 2, samples=16)
+    rho = harmonic.anisotropic_transfer(Polynomial(), 2, 2, samples=8)
+    small = harmonic.transfer(Polynomial(), 2, 2)
     for l, n in [(0, 0), (1, -1), (1, 1), (2, -2), (2, 0)]:
         for p, q in [(0, 0), (1, 1), (1, -1), (2, 1), (2, -2)]:
             expected = small[l, p, abs(q)] if n == q else np.zeros(3)
-            # 32 azimuths against 64: at grazing angles the lobe is narrow in them.
-            np.testing.assert_allclose(rho[l * l + l + n, p * p + p + q], expected, rtol=0, atol=1e-3)
+            np.testing.assert_allclose(rho[l * l + l + n, p * p + p + q], expected, rtol=0, atol=1e-12)
 
 
 def test_uniform_light_finds_the_mean_of_the_lobe():  # RH 3.21, 3.22 mended

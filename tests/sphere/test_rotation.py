@@ -114,6 +114,13 @@ def test_the_kernel_finds_the_angles_of_rh_2_10(alpha):
     assert kernel.angles(np.diag([1.0, 1, -1]))[-1] > 1
 
 
+@pytest.mark.parametrize("size", [1e-150, 1e150])
+def test_large_and_small_coefficients_turn_alike(rng, size):
+    # The kernel scales its rows by 2^900; what it turns must neither overflow with them nor vanish.
+    coefficients, R = rng.normal(size=(36, 3)), euler(0.7, 0.1, 2.0)
+    np.testing.assert_allclose(gn.rotate(size * coefficients, R), size * gn.rotate(coefficients, R), rtol=1e-12)
+
+
 def test_single_precision_is_kept(rng):
     coefficients = rng.normal(size=(9, 3)).astype(np.float32)
     assert gn.rotate(coefficients, np.eye(3)).dtype == np.float32
