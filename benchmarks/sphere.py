@@ -136,10 +136,62 @@ def compare(degree: int, grid: gn.LatLong, dtype: type, repetitions: int) -> Non
             f"  {name:10} synthesis {synthesis[name]:8.2f} ms ({synthesis[name] / synthesis['gonio']:5.2f} of ours)"
             f"   analysis {analysis[name]:8.2f} ms ({analysis[name] / analysis['gonio']:5.2f})   error {error:.1e}"
         )
-    size = grid.rows * grid.columns * 3 * np.dtype(dtype).itemsize / 1e6
-    # One product for each of (re, im) x channel, ring pair, l and m >= 0, and half a step of the recursion.
-    products = (degree + 1) * (degree + 2) / 2 * ((grid.rows + 1) // 2) * (6 + 1.5)
-    print(f"  image {size:.1f} MB; sums over theta {products / 1e6:.0f} million products, Fourier sums not counted")
+    size = grid.rows * grid.columns * 3 * np.dtype(dtype).itemsize
+    # One product for each of (re, im) x channel and two for each step of the recursion, a step for two degrees;
+    # for every pair of rings, l and m >= 0.
+    triangle = (degree + 1) * (degree + 2) / 2 * ((grid.rows + 1) // 2)
+    copying, products, recursion = copy_bandwidth(), product_rate(dtype), product_rate(np.float64)
+    print(
+        f"  limits: image {size / 1e6:.1f} MB, {size / copying * 1e3:.2f} ms at a copy's {copying / 1e9:.1f} GB/s; "
+        f"sums over theta {triangle * 6 / products * 1e3 + triangle / recursion * 1e3:.2f} ms "
+        f"at {products / 1e9:.0f} billion products a second; Fourier sums not counted"
+    )
+
+
+def copy_bandwidth() -> float:
+    """Bytes a second that a copy beyond the caches reads."""
+    source = np.ones(2**24)
+    target = np.empty_like(source)
+    return source.nbytes / (times({"copy": lambda: np.copyto(target, source)}, 5)["copy"] / 1e3)
+
+
+def product_rate(dtype: type) -> float:
+    """Products added a second in a large product of matrices, near the most that one core does."""
+    x = np.ones((768, 768), dtype)
+    out = np.empty_like(x)
+    return float(768**3 / (times({"product": lambda: np.matmul(x, x, out=out)}, 5)["product"] / 1e3))
+
+
+def spins(degree: int, grid: gn.LatLong, repetitions: int) -> None:
+    """Synthesis of complex spin-weighted RGB, beside ducc0's of two real fields each (spin above 0)."""
+    rng = np.random.default_rng(3)
+    print(f"\nspin, degree {degree}, {grid.rows} x {grid.columns} RGB complex128")
+    for spin in range(4):
+        f = rng.normal(size=((degree + 1) ** 2, 3)) + 1j * rng.normal(size=((degree + 1) ** 2, 3))
+        f[: spin * spin] = 0
+        values = gn.synthesis_spin(f, grid, spin)
+        works: dict[str, Work] = {
+            "synthesis": lambda f=f, spin=spin: gn.synthesis_spin(f, grid, spin),
+            "analysis": lambda values=values, spin=spin: gn.analysis_spin(values, grid, degree, spin),
+        }
+        try:
+            import ducc0
+        except ImportError:
+            pass
+        else:
+            size = (degree + 1) * (degree + 2) // 2
+            alm = rng.normal(size=(3, 2, size)) + 1j * rng.normal(size=(3, 2, size))
+            options = {"lmax": degree, "geometry": "F1", "ntheta": grid.rows, "nphi": grid.columns, "nthreads": 1}
+            parts = (
+                [(alm[c], spin) for c in range(3)]
+                if spin
+                else [(alm[c, k : k + 1], 0) for c in range(3) for k in (0, 1)]
+            )
+            works["ducc0 synthesis"] = lambda parts=parts, options=options: [
+                ducc0.sht.synthesis_2d(alm=part, spin=s, **options) for part, s in parts
+            ]
+        taken = times(works, repetitions)
+        print(f"  spin {spin}   " + "   ".join(f"{name} {t:7.2f} ms" for name, t in taken.items()))
 
 
 def nine_coefficients(repetitions: int) -> None:
@@ -170,3 +222,5 @@ if __name__ == "__main__":
     for dtype in (np.float32, np.float64):
         compare(30, gn.LatLong(256, 512), dtype, 3 * count)
         compare(512, gn.LatLong(1024, 2048), dtype, count)
+    spins(24, gn.LatLong(64, 128), count)
+    spins(60, gn.LatLong(128, 256), count)

@@ -179,6 +179,16 @@ def test_gradients_flow_through_torch(rng):
     close(f.grad.numpy(), expected, atol=1e-12)
 
 
+def test_gradients_flow_after_inference_with_the_same_tables():
+    torch = pytest.importorskip("torch")
+    grid, f = LatLong(10, 20), torch.ones(9, dtype=torch.float64)
+    with torch.inference_mode():
+        gn.synthesis(f.clone(), grid)
+    f.requires_grad_()
+    gn.synthesis(f, grid)[0, 0].backward()
+    close(f.grad.numpy(), gn.harmonics(2, grid.directions()[0, 0]), atol=1e-13)
+
+
 @pytest.mark.parametrize("recursion", [folded_recursion(LatLong(24, 48), 21), spin_recursion(LatLong(24, 48), 21, 2)])
 def test_kernels_agree_with_the_plain_recursion(recursion, rng):
     parts = recursion.start, recursion.level, recursion.a, recursion.b, recursion.scale, recursion.t

@@ -53,7 +53,7 @@ def synthesise(coefficients: np.ndarray, grid: Grid, degree: int) -> np.ndarray:
 def _weights(grid: Grid) -> np.ndarray:
     """Weights (2, pairs) of the sums and, times cos theta, of the differences; the equator comes twice."""
     pairs = (grid.rows + 1) // 2
-    weights = grid.weights[:pairs] * np.stack((np.ones(pairs), np.cos(grid.theta[:pairs])))
+    weights: np.ndarray = grid.weights[:pairs] * np.stack((np.ones(pairs), np.cos(grid.theta[:pairs])))
     if grid.rows % 2:
         weights[:, -1] /= 2
     return weights

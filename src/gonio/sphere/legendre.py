@@ -25,6 +25,7 @@ from functools import lru_cache
 import numpy as np
 
 from .._kernels import legendre as kernels
+from ..arrays import Array
 from .grids import Grid
 
 _LEVEL = 512  # a number is start 2^(_LEVEL level), as in the kernels
@@ -44,6 +45,8 @@ class Recursion:
     first: np.ndarray  # (orders,): the rings first..stop are not negligible
     stop: np.ndarray
     t: np.ndarray  # (rings,): the argument, cos theta or its square
+    kept: dict[tuple[str, str], list[Array]] = dataclasses.field(default_factory=dict, repr=False)
+    """Tables of all orders for other libraries, by dtype and device (whose names tell the libraries apart)."""
 
     def synthesise(
         self, coefficients: np.ndarray, orders: slice = slice(None), rings: np.ndarray | None = None

@@ -18,6 +18,7 @@ First a Fourier sum over each row (`azimuth.py`), then for every order m a sum o
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -32,6 +33,8 @@ from .harmonics import degree_of, require_degree
 from .legendre import Recursion, folded_recursion, spin_recursion
 from .packing import pack, pack_spin, unpack, unpack_spin
 from .quadrature import weighted
+
+_KEPT = 2**22  # numbers in the tables that a recursion keeps for arrays of one kind: 32 MiB of float64
 
 
 def analysis(values: Array, grid: Grid, degree: int) -> Array:
@@ -120,8 +123,7 @@ def _sums(recursion: Recursion, packed: Array) -> Array:
     if is_numpy(packed):
         return recursion.synthesise(packed)
     xp = namespace(packed)
-    tables = (like(recursion.table(m), packed) for m in range(packed.shape[0]))
-    return xp.stack(tuple(packed[m, ...].mT @ t for m, t in enumerate(tables)), axis=0)
+    return xp.stack(tuple(packed[m, ...].mT @ t for m, t in enumerate(_tables(recursion, packed))), axis=0)
 
 
 def _projections(recursion: Recursion, rings: Array) -> Array:
@@ -129,8 +131,22 @@ def _projections(recursion: Recursion, rings: Array) -> Array:
     if is_numpy(rings):
         return recursion.analyse(rings)
     xp = namespace(rings)
-    tables = (like(recursion.table(m), rings) for m in range(rings.shape[0]))
-    return xp.stack(tuple(t @ rings[m, ...].mT for m, t in enumerate(tables)), axis=0)
+    return xp.stack(tuple(t @ rings[m, ...].mT for m, t in enumerate(_tables(recursion, rings))), axis=0)
+
+
+def _tables(recursion: Recursion, reference: Array) -> Iterable[Array]:
+    """The functions of every order, (steps, rings) each, as arrays beside `reference`; kept where not large."""
+    orders, steps = recursion.a.shape
+    if orders * steps * recursion.t.size > _KEPT:
+        return (like(recursion.table(m), reference) for m in range(orders))
+    kind = str(reference.dtype), str(reference.device)
+    if kind in recursion.kept:
+        return recursion.kept[kind]
+    tables = [like(recursion.table(m), reference) for m in range(orders)]
+    # What PyTorch makes in its inference mode may not meet gradients later.
+    if not getattr(tables[0], "is_inference", bool)():
+        recursion.kept[kind] = tables
+    return tables
 
 
 def _channels(x: Array, axes: int) -> Array:
