@@ -31,7 +31,7 @@ def test_a_numpy_scalar_is_a_number_and_no_array():
     assert a.dtype == b.dtype == np.float32
 
 
-@pytest.mark.parametrize("value", [1j, "seven", [1, "two"], np.array([1 + 2j])])
+@pytest.mark.parametrize("value", [1j, "seven", [1, "two"], np.array([1 + 2j]), [[1, 2], [3]]])
 def test_what_is_no_real_number_is_refused(value):
     with pytest.raises(gn.GonioError, match="real numbers"):
         floats(value)

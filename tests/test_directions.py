@@ -195,6 +195,14 @@ def test_components_must_come_last(w):
         spherical(w)
 
 
+@pytest.mark.parametrize("function", [cross, half_vector, half_difference, reflect, uvw, gn.Lambert(0.5).f])
+@pytest.mark.parametrize("shapes", [((2,), (3,)), ((3,), (4, 2)), ((4, 3), (5, 3))])
+def test_pairs_that_do_not_fit_are_refused(function, shapes):
+    a, b = (np.broadcast_to(np.eye(shape[-1])[-1], shape) for shape in shapes)
+    with pytest.raises(gn.GonioError, match=r"components last|broadcast"):
+        function(a, b)
+
+
 @pytest.mark.parametrize("q", [[1, 1, 0], [0, 0, -0.1], [0, 0, 1.1], [np.nan, 0, 0]])
 def test_uvw_outside_its_domain_is_refused(q):
     with pytest.raises(gn.GonioError, match="RS 7"):

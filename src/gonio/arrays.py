@@ -87,6 +87,15 @@ def require_finite(x: Array, name: str) -> None:
         raise ArrayError(f"{name}{index} is {float(to_numpy(x)[at])}. Mask or mend such entries before passing them.")
 
 
+def require_broadcast(**arrays: Array) -> None:
+    """Raises `ArrayError` naming the arrays and their shapes where they do not broadcast against each other."""
+    try:
+        np.broadcast_shapes(*(tuple(a.shape) for a in arrays.values()))
+    except ValueError as error:
+        shapes = " and ".join(f"{name} {tuple(a.shape)}" for name, a in arrays.items())
+        raise ArrayError(f"{shapes} do not broadcast against each other.") from error
+
+
 def frozen(x: Array, dtype: Any = np.float64) -> Array:
     """A read-only NumPy copy of `x` to hold in a model (a tensor is held as it is, so that gradients reach it)."""
     if compat.is_array_api_obj(x) and not compat.is_numpy_array(x):
@@ -103,7 +112,10 @@ def _leads(x: Array) -> bool:
 
 def _cast(x: Array, xp: Any, dtype: Any, device: Any) -> Array:
     if not _leads(x) or (compat.is_numpy_array(x) and not compat.is_numpy_namespace(xp)):
-        values = np.asarray(x)
+        try:
+            values = np.asarray(x)
+        except ValueError as error:
+            raise ArrayError(f"expected real numbers in even rows, got {x!r:.60}") from error
         if values.dtype.kind not in "fiub":
             raise ArrayError(f"expected real numbers, got {x!r:.60}")
         # A copy, since PyTorch cannot hold read-only memory.

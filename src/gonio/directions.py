@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from .arrays import Array, floats, is_numpy, like, to_numpy
+from .arrays import Array, floats, is_numpy, like, require_broadcast, to_numpy
 from .errors import ArrayError, DirectionError
 
 # Unit vectors stored in float32, or written with four digits, are taken for unit vectors; slips of scale are not.
@@ -29,6 +29,7 @@ def dot(a: Array, b: Array) -> Array:
 def cross(a: Array, b: Array) -> Array:
     """a x b over the last axis, with broadcasting: (..., 3), (..., 3) -> (..., 3)."""
     xp, a, b = floats(a, b)
+    _require_pair(a=a, b=b)
     x = a[..., 1] * b[..., 2] - a[..., 2] * b[..., 1]
     y = a[..., 2] * b[..., 0] - a[..., 0] * b[..., 2]
     z = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
@@ -85,6 +86,7 @@ def spherical(w: Array) -> tuple[Array, Array]:
 def from_spherical(theta: Array, phi: Array) -> Array:
     """Unit directions (..., 3) at `theta` from +z and `phi` from +x towards +y, both in radians, broadcast."""
     xp, theta, phi = floats(theta, phi)
+    require_broadcast(theta=theta, phi=phi)
     s = xp.sin(theta)
     return xp.stack(xp.broadcast_arrays(s * xp.cos(phi), s * xp.sin(phi), xp.cos(theta)), axis=-1)
 
@@ -96,12 +98,14 @@ def reflect(w: Array, n: Array | None = None) -> Array:
         _require_components(w, "w")
         return xp.stack((-w[..., 0], -w[..., 1], w[..., 2]), axis=-1)
     xp, w, n = floats(w, n)
+    _require_pair(w=w, n=n)
     return 2 * dot(n, w)[..., None] * n - w
 
 
 def half_vector(wi: Array, wo: Array) -> Array:
     """h = (wi + wo) / |wi + wo|, (..., 3). Opposite directions have none; they are answered with the local normal."""
     xp, wi, wo = floats(wi, wo)
+    _require_pair(wi=wi, wo=wo)
     h = wi + wo
     length = xp.sqrt(dot(h, h))[..., None]
     normal = like([0.0, 0.0, 1.0], h)
@@ -182,6 +186,12 @@ def _turn(xp: Any, angle: Array, period: float) -> Array:
 def _require_components(w: Array, name: str) -> None:
     if w.ndim == 0 or w.shape[-1] != 3:
         raise ArrayError(f"{name} has shape {tuple(w.shape)}; directions are (..., 3), components last.")
+
+
+def _require_pair(**vectors: Array) -> None:
+    for name, w in vectors.items():
+        _require_components(w, name)
+    require_broadcast(**vectors)
 
 
 class _Index:

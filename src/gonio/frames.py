@@ -9,7 +9,7 @@ singular direction; its s and t carry no meaning, so anisotropic models want a t
 
 from __future__ import annotations
 
-from .arrays import Array, floats, like
+from .arrays import Array, floats, like, require_broadcast
 from .directions import cross, dot, normalise, require_unit
 from .errors import DirectionError
 
@@ -31,6 +31,7 @@ def frame(n: Array, tangent: Array | None = None) -> Array:
         t = xp.stack((b, sign + y * y * a, -y), axis=-1)
         return xp.stack((s, t, n), axis=-2)
     xp, n, tangent = floats(n, tangent)
+    require_broadcast(n=n, tangent=tangent)
     n, tangent = xp.broadcast_arrays(n, tangent)
     s = tangent - dot(n, tangent)[..., None] * n
     if not bool(xp.all(dot(s, s) > 1e-12 * dot(tangent, tangent))):

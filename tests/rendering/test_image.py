@@ -164,6 +164,8 @@ def test_an_interrupt_leaves_the_finished_tiles():
     [
         ({"samples": 0}, "samples = 0"),
         ({"supersample": 1.5}, "supersample = 1.5"),
+        ({"samples": float("nan")}, "samples = nan"),
+        ({"threads": 0}, "threads = 0"),
         ({"out": np.zeros((4, 4, 3), np.float32)}, "out is"),
         ({"out": np.zeros((48, 48, 3))}, "out is float64"),
     ],

@@ -21,7 +21,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ..arrays import Array, floats, frozen, is_numpy, like, namespace, to_numpy
+from ..arrays import Array, floats, frozen, is_numpy, like, namespace, require_broadcast, to_numpy
 from ..directions import cos_theta, require_unit
 from ..errors import ParameterError
 
@@ -75,11 +75,12 @@ class BRDF(Parametric, ABC):
         """The BRDF in 1/sr: unit local directions (..., 3), (..., 3), broadcast -> (..., C).
 
         Zero below the surface. Raises `DirectionError` for directions that are not unit, `ArrayError` for shapes
-        that are not (..., 3).
+        that are not (..., 3) or do not broadcast.
         """
         require_unit(wi, "wi")
         require_unit(wo, "wo")
         xp, wi, wo = floats(wi, wo)
+        require_broadcast(wi=wi, wo=wo)
         return self.evaluate(xp, wi, wo)
 
     def evaluate(self, xp: Any, wi: Array, wo: Array) -> Array:

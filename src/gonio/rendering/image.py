@@ -57,10 +57,11 @@ def render(
     `progress` raises, ends the work soon and passes through; finished tiles stand in `out` (rows, columns, 3)
     float32 where one is given, which is then also what is returned.
 
-    Raises `ParameterError` for counts below one, `ArrayError` for an `out` that does not fit.
+    Raises `ParameterError` for counts that are not whole numbers from one up, `ArrayError` for an `out` that does not fit.
     """
-    for name, value in (("samples", samples), ("supersample", supersample)):
-        if int(value) != value or value < 1:
+    counts = {"samples": samples, "supersample": supersample, "threads": 1 if threads is None else threads}
+    for name, value in counts.items():
+        if not isinstance(value, int | np.integer) or value < 1:
             raise ParameterError(f"{name} = {value} is not a whole number >= 1.")
     rows, columns = camera.size
     if out is None:

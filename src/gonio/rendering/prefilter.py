@@ -35,6 +35,7 @@ def reflection_map(light: Environment, A: Array, rows: int, error: float = 0.01)
 
     Raises `ParameterError` where `rows` carries fewer degrees than that, or `A` ends before it.
     """
+    _, A = floats(A)
     degree = degree_needed(A, error)
     grid = LatLong(rows, 2 * rows)
     if degree > grid.highest_degree:
