@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 from typing import Any
 
@@ -82,7 +83,7 @@ def _image(path: Path) -> dict[str, Any]:
         "channels": list(header.channels),
         "samples": header.dtype,
         "encoding": header.encoding or "not stated",
-        "mean": image.mean(axis=(0, 1)).tolist(),
+        "mean": image.mean(axis=(0, 1), dtype=np.float64).tolist(),
         "luminance": {
             name: float(of(bright)) for name, of in (("least", np.min), ("median", np.median), ("most", np.max))
         },
@@ -90,7 +91,12 @@ def _image(path: Path) -> dict[str, Any]:
     layout = _layout(path)
     if layout:
         facts["environment map"] = layout
-    attributes = {k: v for k, v in header.attributes.items() if isinstance(v, str | int | float)}
+    attributes = {
+        # NaN and infinity are no JSON.
+        k: v
+        for k, v in header.attributes.items()
+        if isinstance(v, str | int) or (isinstance(v, float) and math.isfinite(v))
+    }
     if attributes:
         facts["attributes"] = attributes
     return facts

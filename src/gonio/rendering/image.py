@@ -57,7 +57,8 @@ def render(
     `progress` raises, ends the work soon and passes through; finished tiles stand in `out` (rows, columns, 3)
     float32 where one is given, which is then also what is returned.
 
-    Raises `ParameterError` for counts that are not whole numbers from one up, `ArrayError` for an `out` that does not fit.
+    Raises `ParameterError` for counts that are not whole numbers from one up, `ArrayError` for an `out` that does not
+    fit.
     """
     counts = {"samples": samples, "supersample": supersample, "threads": 1 if threads is None else threads}
     for name, value in counts.items():
