@@ -1,3 +1,4 @@
+import numba
 import numpy as np
 import pytest
 
@@ -7,6 +8,7 @@ from gonio.files.images import write_images
 from gonio.frames import euler
 
 O = gn.Orientation
+compiled = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="takes minutes where loops are not compiled")
 
 
 @pytest.fixture
@@ -181,6 +183,7 @@ def test_a_tool_without_such_maps_is_refused(tmp_path, room):
     assert not list(tmp_path.iterdir())
 
 
+@compiled
 @pytest.mark.filterwarnings("ignore::gonio.errors.AlphaWarning")
 @pytest.mark.parametrize(("name", "tolerance"), [("Orientation", 0.07), ("StageEnv", 0.2)])
 def test_openexr_s_lat_long_and_cube_of_one_scene_agree(data, name, tolerance):
@@ -197,6 +200,7 @@ def test_openexr_s_lat_long_and_cube_of_one_scene_agree(data, name, tolerance):
     assert np.sqrt((off**2).mean()) < tolerance * (1 if name == "Orientation" else flat.image[band].std())
 
 
+@compiled
 @pytest.mark.filterwarnings("ignore::gonio.errors.AlphaWarning")
 def test_openexr_s_maps_agree_to_a_tenth_with_their_pixels_on_the_edges(data):
     # The same, looked up where ImfEnvmap says the lat-long map's pixels lie: what is left is the cube's half pixel.

@@ -12,6 +12,7 @@ F(a1, b1) - F(a0, b1) - F(a1, b0) + F(a0, b0), F(a, b) = atan(a b / sqrt(1 + a^2
 from __future__ import annotations
 
 import dataclasses
+from abc import abstractmethod
 from typing import Any, ClassVar
 
 import numpy as np
@@ -34,8 +35,9 @@ class _Cube(Mapping):
     sheets: ClassVar[int] = 6
     kernel: ClassVar[int] = kernels.CUBE
 
+    @abstractmethod
     def _side(self, rows: int, columns: int) -> int:
-        raise NotImplementedError
+        """Pixels along a face. Raises `ArrayError` for another aspect."""
 
     def sheet_shape(self, rows: int, columns: int) -> tuple[int, int]:
         side = self._side(rows, columns)

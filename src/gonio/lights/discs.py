@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from abc import abstractmethod
 from typing import Any, ClassVar
 
 import numpy as np
@@ -32,9 +33,9 @@ class _Disc(Mapping):
     # Radius of the disc where half the sheet's side is 1.
     rim: float = 1.0
 
+    @abstractmethod
     def _cap(self, r: np.ndarray) -> np.ndarray:
         """G(r) = 1 - cos theta(r) for r in [0, rim]."""
-        raise NotImplementedError
 
     def sheet_shape(self, rows: int, columns: int) -> tuple[int, int]:
         if rows < 2 or columns != rows:
@@ -101,11 +102,13 @@ class _Disc(Mapping):
 class _Radial(_Disc):
     """One disc, on which theta depends on r alone."""
 
+    @abstractmethod
     def _theta(self, r: np.ndarray) -> np.ndarray:
-        raise NotImplementedError
+        """Angle from the centre's direction at radius r in [0, 1]."""
 
+    @abstractmethod
     def _radius(self, xp: Any, theta: Array) -> Array:
-        raise NotImplementedError
+        """The inverse of `_theta`."""
 
     def _cap(self, r: np.ndarray) -> np.ndarray:
         cap: np.ndarray = 2 * np.sin(self._theta(r) / 2) ** 2
@@ -131,9 +134,9 @@ class _Radial(_Disc):
         r = np.hypot(2 * u - 1, 1 - 2 * v)
         return np.where(r < 1, self._slope(np.minimum(r, 1.0)), 0.0)
 
+    @abstractmethod
     def _slope(self, r: np.ndarray) -> np.ndarray:
         """G'(r) / r for r in [0, 1], but for a constant factor."""
-        raise NotImplementedError
 
 
 @dataclasses.dataclass(frozen=True)
