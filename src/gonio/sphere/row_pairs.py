@@ -19,8 +19,7 @@ import numpy as np
 from .._kernels import row_pairs as kernels
 from .grids import Grid
 
-_PRODUCTS = 2**18  # bytes of rows taken at once by products,
-_TRANSFORMS = 2**19  # and by transforms
+_PIECE = 2**19  # bytes of rows taken at once
 
 
 class Matrices:
@@ -38,7 +37,7 @@ class Matrices:
         channels = values.shape[2]
         image = np.ascontiguousarray(values).reshape(self.grid.rows, -1)
         matrices, sums = self._matrices(values.dtype), self._sums(channels, values.dtype)
-        for pairs in _pieces(self.grid, image[:2].nbytes, _PRODUCTS):
+        for pairs in _pieces(self.grid, image[:2].nbytes):
             quarters = self._quarters(channels, pairs, values.dtype)
             kernels.fold(image, weights, pairs.start, *quarters)
             np.matmul(quarters.reshape(4, -1, quarters.shape[3]), matrices.mT, out=_flat(sums, pairs))
@@ -54,7 +53,7 @@ class Matrices:
         for ring, part in self._orders(rings, sums):
             part[...] = ring
         image = np.empty((self.grid.rows, self.grid.columns * channels), rings.dtype)
-        for pairs in _pieces(self.grid, image[:2].nbytes, _PRODUCTS):
+        for pairs in _pieces(self.grid, image[:2].nbytes):
             quarters = self._quarters(channels, pairs, rings.dtype)
             np.matmul(_flat(sums, pairs), matrices, out=quarters.reshape(4, -1, quarters.shape[3]))
             kernels.unfold(*quarters, cosines, pairs.start, image)
@@ -102,7 +101,7 @@ class Transforms:
         channels = values.shape[2]
         image = np.ascontiguousarray(values).reshape(self.grid.rows, -1)
         rings = empty_rings(self.grid, self.degree, channels, values.dtype)
-        for pairs in _pieces(self.grid, image[:2].nbytes, _TRANSFORMS):
+        for pairs in _pieces(self.grid, image[:2].nbytes):
             lines = np.empty((2 * channels, pairs.stop - pairs.start, self.grid.columns), values.dtype)
             kernels.gather(image, weights, pairs.start, lines)
             kernels.collect(rfft(lines), pairs.start, rings)
@@ -115,7 +114,7 @@ class Transforms:
         channels = rings.shape[1] // 4
         kind = np.complex64 if rings.dtype == np.float32 else np.complex128
         image = np.empty((self.grid.rows, self.grid.columns * channels), rings.dtype)
-        for pairs in _pieces(self.grid, image[:2].nbytes, _TRANSFORMS):
+        for pairs in _pieces(self.grid, image[:2].nbytes):
             waves = np.empty((2 * channels, pairs.stop - pairs.start, self.grid.columns // 2 + 1), kind)
             kernels.distribute(rings, pairs.start, waves)
             kernels.scatter(irfft(waves, n=self.grid.columns, norm="forward"), cosines, pairs.start, image)
@@ -141,9 +140,9 @@ def _flat(sums: np.ndarray, pairs: slice) -> np.ndarray:
     return sums[:, pairs].reshape(4, -1, sums.shape[3])
 
 
-def _pieces(grid: Grid, size: int, most: int) -> Iterator[slice]:
+def _pieces(grid: Grid, size: int) -> Iterator[slice]:
     """Slices that cover the pairs of rows, of `size` bytes each; every slice but the last holds a multiple of 8."""
-    step, pairs = max(8, most // size // 8 * 8), (grid.rows + 1) // 2
+    step, pairs = max(8, _PIECE // size // 8 * 8), (grid.rows + 1) // 2
     return (slice(low, min(low + step, pairs)) for low in range(0, pairs, step))
 
 
