@@ -9,7 +9,7 @@ sys.path.insert(0, str(Path(__file__).parent / "extensions"))
 
 project = "gonio"
 author = "The gonio authors"
-copyright = f"2026, {author}"  # noqa: A001 (Sphinx reads this name)
+copyright = f"2026, {author}"
 release = gonio.__version__
 
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinxcontrib.bibtex", "public_names"]

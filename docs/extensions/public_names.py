@@ -8,7 +8,6 @@ import ast
 from pathlib import Path
 
 from docutils import nodes
-from docutils.statemachine import StringList
 from docutils.utils import new_document
 from myst_parser.parsers.sphinx_ import MystParser
 from sphinx.application import Sphinx
