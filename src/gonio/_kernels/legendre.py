@@ -7,9 +7,9 @@
 Eight steps are taken for a block of rings that stays in the first cache, then used for every channel k. The recursion
 runs in float64, the sums in the dtype of the channels. Steps come in eights, channels in pairs.
 
-`level` < 0 marks numbers too small to matter, below 2^-512 times what eight steps can add; they count as 0 until the
-recursion has lifted them to level 0. 2^512 is the root of a float64's range: at or above 2^-513 a number has 500 powers
-of two below it, and one below 1 has 2^1023 above it, where eight steps grow by less than (2^64)^8.
+`level` < 0 marks numbers too small to matter; they count as 0 until the recursion has lifted them to level 0. They are
+looked at after every eight steps, and 2^512 is the root of a float64's range: a number of 2^-513 or more has 509 powers
+of two below it before it loses digits, and one below 1 stays below 2^512 if each step multiplies by less than 2^64.
 """
 
 from __future__ import annotations

@@ -182,11 +182,11 @@ def _range(theta: np.ndarray, degree: int, spin: int) -> tuple[np.ndarray, np.nd
     """For each order the rings first..stop where lambda is not negligible: what is left out is below 1e-20.
 
     With y = log tan(theta / 2) the functions obey lambda'' = Q lambda, Q = n^2 - l (l + 1) sin^2 theta, n^2 = m^2 + s^2
-    - 2 m s cos theta. Where Q > 0, towards a pole, v = lambda' / lambda grows from n by v' = Q - v^2; it stays above
+    - 2 m s cos theta. Where Q > 0, towards a pole, v = lambda' / lambda starts at n with v' = Q - v^2; it stays above
     sqrt(Q), since Q falls on the way out (v' = 0 where they meet). So lambda dies at least as exp(-S), S = integral of
     sqrt(Q) dy out to Q = 0. There x = (l + 1/2) sin theta, no less than the root of what is taken off n^2, has
-    dy = dx / (x cos theta) >= dx / x; the n of here is the least from here on if s cos theta counts as positive; then S
-    is at least the integral of sqrt(n^2 - x^2) dx / x from here to x = n (with spin v may start below it; see the test):
+    dy = dx / (x cos theta) >= dx / x; the n of here is the least from here on if s cos theta counts as positive. So S
+    is at least the integral of sqrt(n^2 - x^2) dx / x from here to x = n (with spin Q need not fall; a test measures):
 
         n artanh(w / n) - w,  w = sqrt(n^2 - x^2)        (Debye's exponent of the Bessel function J_n(x))
     """
