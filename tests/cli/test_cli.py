@@ -225,3 +225,18 @@ def test_terms_add_and_weights_scale():
     expected = gn.Lambert([0.2, 0.4, 0.6]) + 2 * gn.Microfacet(gn.GGX(0.3), gn.Fresnel(1.5))
     wi, wo = gn.normalise([[0.3, 0.1, 0.9]]), gn.normalise([[-0.2, 0.4, 0.8]])
     np.testing.assert_array_equal(brdf.f(wi, wo), expected.f(wi, wo))
+
+
+def test_a_square_probe_lights_a_ball_once_its_layout_is_named(capsys, tmp_path):
+    probe = tmp_path / "probe.pfm"  # a format whose header says nothing of layouts
+    gn.write_image(probe, np.ones((16, 16, 3)))
+    render = ("render", "--light", probe, "--size", 8, "-o", tmp_path / "ball.exr")
+    code, _, err = run(capsys, *render)
+    assert code == 2
+    assert "AngularMap" in err
+    code, _, err = run(capsys, *render, "--layout", "angular")
+    assert code == 0
+    assert "AngularMap PROBE" in err  # what was taken is told
+    # A white furnace: what is 1 all around is the albedo on the ball, .6 by default, and 1 behind it.
+    image = gn.read_image(tmp_path / "ball.exr")
+    np.testing.assert_allclose(image[3:5, 3:5], 0.6, rtol=0.01)

@@ -8,6 +8,7 @@ import pytest
 import gonio as gn
 from gonio.lights.environment import Environment
 from gonio.lights.points import Directional, Lights, Point
+from gonio.rendering.image import beams_wanted
 
 ABOVE = gn.Orthographic(size=(48, 48), pixel=1 / 20, pose=gn.look_at((0, 0, 5), (0, 0, 0), up=(0, 1, 0)))
 SUN = gn.normalise(np.array([0.4, -0.3, 0.8]))
@@ -274,3 +275,18 @@ def test_mitsuba_sees_the_same_sphere_in_an_environment(mitsuba):
     assert np.median(relative) < 0.02
     bias = ours[inside].mean(axis=0) / reference[inside].mean(axis=0) - 1
     assert np.abs(bias).max() < 0.005
+
+
+def test_a_narrow_lobe_wants_more_beams_as_the_square_of_its_width():
+    few, many = (beams_wanted(gn.Microfacet(gn.GGX(alpha), gn.Schlick(1.0))) for alpha in (0.1, 0.05))
+    assert many / few == pytest.approx(4, rel=0.05)
+
+
+def test_too_few_beams_for_a_narrow_lobe_are_told():
+    room = gn.studio(32)
+    metal = gn.Microfacet(gn.GGX(0.03), gn.Schlick(1.0))
+    camera = gn.Pinhole.look_at(eye=(0, -4, 0), target=(0, 0, 0), field_of_view=30, size=(4, 4))
+    with pytest.warns(gn.GonioWarning, match="in dots"):
+        gn.render(gn.Sphere(), metal, room, camera, samples=64)
+    gn.render(gn.Sphere(), metal, room, camera)  # every texel of so small a room: nothing to warn of
+    gn.render(gn.Sphere(), gn.Lambert(0.5), room, camera, samples=64)

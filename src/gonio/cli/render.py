@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from . import parse
+from . import maps, parse
 from .info import MESHES
 from .progress import bar
 
@@ -36,9 +36,11 @@ def render(
     smooth: bool = typer.Option(False, "--smooth", help="Give a mesh smooth normals in place of its file's."),
     y_up: bool = typer.Option(False, "--y-up", help="Stand a mesh up whose file has y upwards."),
     light: list[Path] = typer.Option([], "--light", help="An environment map. Without any light: a room of gonio's."),
+    layout: maps.Layout | None = typer.Option(None, "--layout", help="Its layout, where its shape does not tell."),
+    orientation: str = typer.Option("", "--orientation", help="The tool whose convention it follows."),
     sun: list[str] = typer.Option([], "--sun", help="A directional light x,y,z[:irradiance], towards the light."),
     size: str = typer.Option("512", "--size", help="Pixels, as 640x480 or 512."),
-    samples: int = typer.Option(1024, "--samples", help="Light samples a pixel, for environments."),
+    samples: int | None = typer.Option(None, "--samples", help="Most beams a ray takes of the light; else as needed."),
     shadows: bool = typer.Option(False, "--shadows", help="Trace shadow rays."),
     eye: str = typer.Option("2.6,-3.2,1.6", "--eye", help="The camera's place x,y,z, z up, in radii of the shape."),
     field_of_view: float = typer.Option(34.0, "--fov", help="Vertical field of view in degrees."),
@@ -68,7 +70,7 @@ def render(
         image = gn.render(
             scene,
             material,
-            _light(light, sun),
+            _light(light, layout, orientation, sun),
             camera,
             shadows=shadows,
             samples=samples,
@@ -112,9 +114,7 @@ def _shape(name: str, relief: float, smooth: bool, y_up: bool) -> tuple[Any, lis
         return gn.Sphere(), [0.0, 0.0, 0.0], 1.0
     shape: Any
     if name == "vase":
-        from gonio.shapes.revolution import vase
-
-        shape = vase()
+        shape = gn.vase()
     elif Path(name).suffix.lower() in MESHES:
         shape = gn.read_mesh(name)
         if smooth:
@@ -129,13 +129,15 @@ def _shape(name: str, relief: float, smooth: bool, y_up: bool) -> tuple[Any, lis
     return shape, centre.tolist(), float(np.linalg.norm(corners - centre, axis=-1).max())
 
 
-def _light(maps: list[Path], suns: list[str]) -> Light:
+def _light(files: list[Path], layout: maps.Layout | None, orientation: str, suns: list[str]) -> Light:
     import gonio as gn
 
-    lights: list[Light] = [gn.read_environment(path) for path in maps]
+    lights: list[Light] = []
+    for path in files:
+        environment = maps.read([path], layout, orientation)
+        typer.echo(f"{path}: {maps.stands(environment)}", err=True)
+        lights.append(environment)
     lights += [parse.directional(text) for text in suns]
     if not lights:
-        from gonio.lights.studio import studio
-
-        return studio()
+        return gn.studio()
     return lights[0] if len(lights) == 1 else gn.Lights(tuple(lights))

@@ -215,10 +215,9 @@ def _by_shape(path: Path) -> Mapping:
     ):
         if rows * wide == columns * high and rows % high == 0:
             return mapping
-    square = "; a square one is AngularMap() or MirrorBall()" if rows == columns else ""
     raise FileError(
-        f"{path}: {columns} x {rows} pixels do not tell the layout{square}. Pass mapping=: LatLongMap() 2:1, "
-        "AngularMap() and MirrorBall() 1:1, DualParaboloid() 2:1, CubeCross() 3:4 or 4:3, CubeStrip() 1:6 or 6:1."
+        f"{path}: {columns} x {rows} pixels do not tell the layout. Name it: LatLongMap is 2:1, AngularMap and "
+        "MirrorBall 1:1, DualParaboloid 2:1, CubeCross 3:4 or 4:3, CubeStrip 1:6 or 6:1."
     )
 
 

@@ -94,7 +94,7 @@ def _picture(folder: Path, name: str, image: np.ndarray, caption: str, exposure:
 def _hero(folder: Path, room: Environment) -> Section:
     camera = Pinhole.look_at(eye=(3.9, -4.6, 2.1), target=(0, 0, 0), field_of_view=22, size=(512, 512))
     material = MATERIALS["lacquer: Lambert + GGX .14"]
-    image = render(vase(), material, room, camera, shadows=True, samples=256, supersample=2)
+    image = render(vase(), material, room, camera, shadows=True, supersample=2)
     write_image(folder / "vase.exr", image)
     picture = _picture(folder, "vase", image, "Red lacquer, with shadows.", 1.0)
     command = (
@@ -113,7 +113,7 @@ def _materials(folder: Path, room: Environment) -> Section:
     camera = Pinhole.look_at(eye=(3.2, -4.2, 1.4), target=(0, 0, 0), field_of_view=23, size=(180, 180))
     pictures = []
     for k, (name, material) in enumerate(MATERIALS.items()):
-        image = render(Sphere(), material, room, camera, samples=2048, supersample=2)
+        image = render(Sphere(), material, room, camera, supersample=2)
         pictures.append(_picture(folder, f"material-{k}", image, name, 1.0))
     plot = Picture(lobes(folder / "lobes.png", MATERIALS), "Lobes of the six models, light from the left.")
     return Section(
