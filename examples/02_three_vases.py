@@ -13,7 +13,7 @@ materials = [
 camera = gn.Pinhole.look_at(eye=(3.9, -4.6, 2.1), target=(0, 0, 0), field_of_view=22, size=(480, 360))
 
 room, shape = gn.studio(), gn.vase()
-images = [gn.render(shape, material, room, camera, samples=1024, supersample=2) for material in materials]
+images = [gn.render(shape, material, room, camera, supersample=2) for material in materials]
 picture = np.concatenate(images, axis=1)
 
 gn.write_image("02_three_vases.exr", picture)
