@@ -34,7 +34,7 @@ def main() -> None:
         for name, model in MODELS.items():
             if shadows and name != "GGX":
                 continue
-            gn.render(gn.Sphere(), model, room, camera_of(8), samples=16)  # compiles the kernels
+            gn.render(gn.Sphere(), model, room, camera_of(8), samples=256)  # compiles the kernels
             wall, cpu = time.perf_counter(), time.process_time()
             gn.render(gn.Sphere(), model, room, camera, samples=args.samples, shadows=shadows, threads=1)
             wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
