@@ -240,3 +240,12 @@ def test_a_square_probe_lights_a_ball_once_its_layout_is_named(capsys, tmp_path)
     # A white furnace: what is 1 all around is the albedo on the ball, .6 by default, and 1 behind it.
     image = gn.read_image(tmp_path / "ball.exr")
     np.testing.assert_allclose(image[3:5, 3:5], 0.6, rtol=0.01)
+
+
+def test_info_says_where_a_measured_material_reflects_more_than_it_receives(capsys, data):
+    """Dupuy and Jakob's measurements gain light towards grazing views; satin does so visibly."""
+    code, out, _ = run(capsys, "info", data / "brdf" / "rgl" / "satin_rosaline_rgb.bsdf", "--json")
+    facts = json.loads(out)
+    assert code == 0
+    assert "80 degrees" in facts["looks wrong"]
+    assert max(facts["albedo at 60 degrees"]) < 1
