@@ -290,3 +290,9 @@ def test_too_few_beams_for_a_narrow_lobe_are_told():
         gn.render(gn.Sphere(), metal, room, camera, samples=64)
     gn.render(gn.Sphere(), metal, room, camera)  # every texel of so small a room: nothing to warn of
     gn.render(gn.Sphere(), gn.Lambert(0.5), room, camera, samples=64)
+
+
+def test_an_image_beyond_the_memory_limit_is_refused_before_it_is_made():
+    camera = gn.Orthographic(size=(40000, 40000), pixel=1e-4, pose=gn.look_at((0, 0, 5), (0, 0, 0), up=(0, 1, 0)))
+    with pytest.raises(gn.GonioError, match=r"19.2 GB.*memmap"):
+        gn.render(gn.Sphere(), gn.Lambert(0.5), Directional(SUN), camera)

@@ -20,7 +20,7 @@ import numpy as np
 from ..arrays import to_numpy
 from ..brdf.model import BRDF
 from ..cameras import Camera
-from ..errors import AccuracyWarning, ArrayError, ParameterError
+from ..errors import MEMORY_LIMIT, AccuracyWarning, ArrayError, MemoryLimitError, ParameterError
 from ..lights.environment import Environment
 from ..lights.model import Beams, Light
 from ..lights.points import Lights
@@ -62,7 +62,8 @@ def render(
     float32 where one is given, which is then also what is returned.
 
     Warns with `AccuracyWarning` where an environment is thinned to fewer beams than the material wants. Raises
-    `ParameterError` for counts that are not whole numbers from one up, `ArrayError` for an `out` that does not fit.
+    `ParameterError` for counts that are not whole numbers from one up, `ArrayError` for an `out` that does not fit,
+    `MemoryLimitError` before an image beyond the limit is made.
     """
     wanted = beams_wanted(material)
     if samples is None:
@@ -73,6 +74,11 @@ def render(
             raise ParameterError(f"{name} = {value} is not a whole number >= 1.")
     rows, columns = camera.size
     if out is None:
+        if 12 * rows * columns > MEMORY_LIMIT:
+            raise MemoryLimitError(
+                f"an image of {rows} x {columns} takes {12e-9 * rows * columns:.1f} GB, the limit is "
+                f"{1e-9 * MEMORY_LIMIT:g}. Ask for fewer pixels, or pass `out`, which may be a numpy.memmap."
+            )
         out = np.zeros((rows, columns, 3), dtype=np.float32)
     elif out.shape != (rows, columns, 3) or out.dtype != np.float32:
         raise ArrayError(f"out is {out.dtype} {out.shape}; float32 {(rows, columns, 3)} is wanted.")
