@@ -6,7 +6,7 @@
     rings      (orders, 4 C, all pairs): cosine sums of the sums, sine sums of them, the same of the differences
 
 Each pair of functions is a sum and its transpose. Indices are unsigned where they run backwards, since numba would test
-signed ones for wrapping around; they are made so last, since LLVM sees steps of -1 in signed sums alone.
+signed ones for wrapping around, and where they take every third number, which would cost half as much again otherwise.
 """
 
 from __future__ import annotations
@@ -102,7 +102,7 @@ def _unfold(cos_even, cos_odd, sin_even, sin_odd, p, line):  # type: ignore[no-u
         third, fourth = line[k, 0, 2 * n : 3 * n], line[k, 0, 3 * n : 4 * n]
         x, y, z, w = cos_even[p, k], cos_odd[p, k], sin_even[p, k], sin_odd[p, k]
         for i in range(n):
-            back = np.uintp(n - 1 - i)
+            back = np.uintp(n - 1 - i)  # subtracted as signed numbers, which LLVM sees run backwards
             a, b, c, d = x[i], y[i], z[i], w[i]
             first[i] = (a + b) + (c + d)
             second[back] = (a - b) - (c - d)

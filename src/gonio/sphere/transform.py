@@ -62,8 +62,8 @@ def synthesis(coefficients: Array, grid: Grid) -> Array:
     Raises `ArrayError` where the coefficients are no square number, or complex, NaN or infinite; `ParameterError`
     where their degree exceeds `grid.highest_degree`.
     """
-    _, coefficients = floats(coefficients)
-    degree = _carried(coefficients, grid)
+    xp, coefficients = floats(coefficients)
+    degree = _carried(xp, coefficients, grid)
     flat = _channels(coefficients, 1)
     if is_numpy(flat):
         values = _numpy_way(grid, degree).synthesise(flat, grid, degree)
@@ -96,7 +96,7 @@ def synthesis_spin(coefficients: Array, grid: Grid, spin: int) -> Array:
     `ParameterError` where abs(spin) exceeds the degree.
     """
     xp, coefficients = _complex(coefficients)
-    degree = _carried(coefficients, grid)
+    degree = _carried(xp, coefficients, grid)
     _require_spin(spin, degree)
     rings = _sums(spin_recursion(grid, degree, spin), pack_spin(_channels(coefficients, 1), degree, spin))
     real, imaginary, back_real, back_imaginary = _quarters(rings)
@@ -181,9 +181,8 @@ def _complex(x: Array) -> tuple[Array, Array]:
     return xp, x + 0j
 
 
-def _carried(coefficients: Array, grid: Grid) -> int:
+def _carried(xp: Any, coefficients: Array, grid: Grid) -> int:
     """The degree of finite coefficients that `grid` carries."""
-    xp = namespace(coefficients)
     degree = degree_of(coefficients)
     if coefficients.ndim > 2:
         raise ArrayError(f"coefficients have shape {tuple(coefficients.shape)}; expected ((degree + 1)^2[, channels]).")
