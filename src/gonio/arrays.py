@@ -16,6 +16,9 @@ import numpy as np
 
 from .errors import ArrayError
 
+_NUMPY = compat.array_namespace(np.empty(0))
+_DTYPES = (np.dtype(np.float32), np.dtype(np.float64))
+
 Array: TypeAlias = Any  # a NumPy, PyTorch or CuPy array, or what np.asarray takes
 
 
@@ -24,6 +27,8 @@ def namespace(*arrays: Array) -> Any:
 
     Raises `ArrayError` where arrays of two libraries are mixed.
     """
+    if all(type(a) is np.ndarray for a in arrays):
+        return _NUMPY
     found = [a for a in arrays if _leads(a)] or [np.empty(0)]
     try:
         return compat.array_namespace(*found)
@@ -34,7 +39,9 @@ def namespace(*arrays: Array) -> Any:
 
 def is_numpy(*arrays: Array) -> bool:
     """True where every array is NumPy's (or a list or number, which becomes NumPy's): the kernels may be used."""
-    return not any(_leads(a) and not compat.is_numpy_array(a) for a in arrays)
+    return all(type(a) is np.ndarray for a in arrays) or not any(
+        _leads(a) and not compat.is_numpy_array(a) for a in arrays
+    )
 
 
 def floats(*arrays: Array) -> tuple[Any, ...]:
@@ -45,6 +52,9 @@ def floats(*arrays: Array) -> tuple[Any, ...]:
 
     Raises `ArrayError` where an array is complex, or holds no numbers.
     """
+    # The common case by a short way: arrays of NumPy alike in dtype are what they should be.
+    if all(type(a) is np.ndarray and a.dtype in _DTYPES and a.dtype == arrays[0].dtype for a in arrays):
+        return _NUMPY, *arrays
     xp = namespace(*arrays)
     given = [a for a in arrays if _leads(a)]
     kinds = [a.dtype for a in given if xp.isdtype(a.dtype, "real floating")]
