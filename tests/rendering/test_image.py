@@ -296,3 +296,20 @@ def test_an_image_beyond_the_memory_limit_is_refused_before_it_is_made():
     camera = gn.Orthographic(size=(40000, 40000), pixel=1e-4, pose=gn.look_at((0, 0, 5), (0, 0, 0), up=(0, 1, 0)))
     with pytest.raises(gn.GonioError, match=r"19.2 GB.*memmap"):
         gn.render(gn.Sphere(), gn.Lambert(0.5), Directional(SUN), camera)
+
+
+def test_lamps_without_extent_want_no_more_beams_than_they_have():
+    """Nothing of theirs is thinned, so that there is nothing to warn of, however narrow the lobe."""
+    metal = gn.Microfacet(gn.GGX(0.01), gn.Schlick(1.0))
+    camera = gn.Pinhole.look_at(eye=(0, -4, 0), target=(0, 0, 0), field_of_view=30, size=(4, 4))
+    for lamp in (Point((0.0, -3.0, 3.0), 1.0), Directional(SUN)):
+        few, many = (gn.render(gn.Sphere(), metal, lamp, camera, samples=n) for n in (1, None))
+        np.testing.assert_array_equal(few, many)
+
+
+def test_too_few_beams_are_told_beside_a_near_lamp_too():
+    metal = gn.Microfacet(gn.GGX(0.03), gn.Schlick(1.0))
+    camera = gn.Pinhole.look_at(eye=(0, -4, 0), target=(0, 0, 0), field_of_view=30, size=(4, 4))
+    light = Lights((gn.studio(32), Point((0.0, -3.0, 3.0), 1.0)))
+    with pytest.warns(gn.GonioWarning, match="in dots"):
+        gn.render(gn.Sphere(), metal, light, camera, samples=64)

@@ -65,7 +65,8 @@ def render(
     `ParameterError` for counts that are not whole numbers from one up, `ArrayError` for an `out` that does not fit,
     `MemoryLimitError` before an image beyond the limit is made.
     """
-    wanted = beams_wanted(material)
+    environments = [part for part in _parts(light) if isinstance(part, Environment)]
+    wanted = beams_wanted(material) if environments else 1
     if samples is None:
         samples = min(max(wanted, FEWEST), MOST)
     counts = {"samples": samples, "supersample": supersample, "threads": 1 if threads is None else threads}
@@ -84,7 +85,7 @@ def render(
         raise ArrayError(f"out is {out.dtype} {out.shape}; float32 {(rows, columns, 3)} is wanted.")
     shape.trace(*camera.rays(np.array([[0.5, 0.5]])))  # builds the ray tracer, before threads would each build one
     sources = _sources(light, samples)
-    if samples < wanted and any(_thinned(source, samples) for source in sources):
+    if samples < wanted and any(samples < part.rows * part.columns for part in environments):
         warnings.warn(
             f"the material's narrowest lobe wants about {wanted} beams to see the light whole; with samples={samples} "
             "it may show it in dots. Pass more samples.",
@@ -136,16 +137,14 @@ def beams_wanted(material: BRDF) -> int:
     return math.ceil(16 * 4 * math.pi * densest)
 
 
-def _thinned(source: Light | Beams, samples: int) -> bool:
-    """Whether `source` may hold fewer beams than its light has."""
-    return (source.irradiance.shape[-2] if isinstance(source, Beams) else samples) >= samples
+def _parts(light: Light) -> tuple[Light, ...]:
+    return light.lights if isinstance(light, Lights) else (light,)
 
 
 def _sources(light: Light, samples: int) -> list[Light | Beams]:
     """The beams of all distant lights, made once for the whole image, and the near lights, whose beams differ."""
-    parts = light.lights if isinstance(light, Lights) else (light,)
-    near = tuple(part for part in parts if not part.distant)
-    far = tuple(part for part in parts if part.distant)
+    near = tuple(part for part in _parts(light) if not part.distant)
+    far = tuple(part for part in _parts(light) if part.distant)
     sources: list[Light | Beams] = [Lights(near)] if near else []
     return [*sources, Lights(far).beams(budget=max(samples - len(near), 1))] if far else sources
 
@@ -180,11 +179,8 @@ def _seen(
 
 def _beyond(light: Light, w: np.ndarray) -> np.ndarray | float:
     """Radiance (N, C) that arrives along `w` (N, 3) from beyond the shape; lights without extent are not seen."""
-    if isinstance(light, Lights):
-        return sum((_beyond(part, w) for part in light.lights), 0.0)
-    if isinstance(light, Environment):
-        return to_numpy(light.radiance(w))
-    return 0.0
+    environments = (part for part in _parts(light) if isinstance(part, Environment))
+    return sum((to_numpy(part.radiance(w)) for part in environments), 0.0)
 
 
 def _edge(pairs: int) -> int:

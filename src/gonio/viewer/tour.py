@@ -119,7 +119,7 @@ def _materials(folder: Path, room: Environment) -> Section:
     return Section(
         "Models of reflectance",
         (
-            Text("A model is a value; models add. Each ball is integrated under the whole room, without noise."),
+            Text("A model is a value; models add. Each ball is lit by the same beams of the room, without noise."),
             Pictures(pictures, 150),
             Text("Their lobes in the plane of incidence, light at 45 degrees: f cos theta_o on a logarithmic scale."),
             Pictures((plot,), 600),
