@@ -74,9 +74,8 @@ def read_image(path: str | os.PathLike[str], encoding: Encoding | None = None) -
 def read_raster(path: str | os.PathLike[str]) -> Raster:
     """Samples as stored, without curve or warning: for masks, normal maps and stacks of photographs."""
     path = Path(path)
-    require_file(path)
-    with _reading(path):
-        raster: Raster = _codec(path).read(path)
+    with _reading(path) as codec:
+        raster: Raster = codec.read(path)
     return raster
 
 
@@ -88,9 +87,8 @@ def read_layers(path: str | os.PathLike[str]) -> dict[str, np.ndarray]:
     stored, NaN and all. Where an earlier part has taken a name, the part's own leads: "right.RGB".
     """
     path = Path(path)
-    require_file(path)
-    with _reading(path):
-        if _codec(path) is not exr:
+    with _reading(path) as codec:
+        if codec is not exr:
             raise FileError(f"{path} has no layers: it is no OpenEXR file. Use read_image.")
         return exr.read_layers(path)
 
@@ -98,9 +96,8 @@ def read_layers(path: str | os.PathLike[str]) -> dict[str, np.ndarray]:
 def image_info(path: str | os.PathLike[str]) -> ImageInfo:
     """Format, size, channels, dtype, encoding and attributes, from the header alone."""
     path = Path(path)
-    require_file(path)
-    with _reading(path):
-        facts: ImageInfo = _codec(path).info(path)
+    with _reading(path) as codec:
+        facts: ImageInfo = codec.info(path)
     return facts
 
 
@@ -227,9 +224,11 @@ def _codec(path: Path) -> ModuleType:
 
 
 @contextlib.contextmanager
-def _reading(path: Path) -> Iterator[None]:
+def _reading(path: Path) -> Iterator[ModuleType]:
+    """The codec of the file at `path`, which has to be a file; what the system refuses becomes a `FileError`."""
+    require_file(path)
     try:
-        yield
+        yield _codec(path)
     except OSError as error:
         raise FileError(f"{path} cannot be read: {error.strerror or error}.") from error
 
