@@ -3,14 +3,6 @@
 import numpy as np
 
 
-def lines(image, channels):
-    """Sums of the northern rows (rows, columns C) and their mirror images, then differences: (2 C, pairs, columns)."""
-    values = image.reshape(image.shape[0], -1, channels)
-    pairs = (image.shape[0] + 1) // 2
-    north, south = values[:pairs], values[::-1][:pairs]
-    return np.concatenate((north + south, north - south), axis=2).transpose(2, 0, 1)
-
-
 def image(lines, rows):
     """The rows (rows, columns C) whose northern ones are sum + difference, and whose mirror images sum - difference."""
     channels = lines.shape[0] // 2
@@ -26,14 +18,14 @@ def turn(quarter, of_sine, of_odd):
     return np.concatenate((half, sign * half), axis=-1)
 
 
-def pack(flat, degree, g, turn, low, orders, steps):
+def pack(flat, degree, g, norms, low, orders, steps):
     """(orders, steps, 4 C): even l - m as they are; odd ones as h of f_{l+1} = g_l h_l + g_{l+1} h_{l+2}, solved."""
     channels = flat.shape[1]
     packed = np.zeros((orders, steps, 4 * channels))
     for i in range(orders):
         m = low + i
         l = np.arange(m, degree + 1)
-        z = turn[m] * (flat[l * (l + 1) + m] + 1j * (flat[l * (l + 1) - m] if m else 0))
+        z = norms[0, m] * flat[l * (l + 1) + m] + 1j * norms[1, m] * flat[l * (l + 1) - m]
         even, odd = z[0::2], z[1::2]
         n = odd.shape[0]
         at = m + 2 * np.arange(n)

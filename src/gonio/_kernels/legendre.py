@@ -1,8 +1,10 @@
 """Sums over sequences that obey a three-term recursion, at many arguments at once: the inner loops of `sphere`.
 
     P_0 = start 2^(512 level),   P_{i+1} = (a_i t + b_i) P_i - P_{i-1}
-    synthesise   rings[m, k, r] = sum_i coefficients[m, i, k] scale[m, i] P_i(m, t_r)
-    analyse      coefficients[m, i, k] = sum_r rings[m, k, r] scale[m, i] P_i(m, t_r)
+    synthesise   ring_r[m, k] = sum_i coefficients[m, i, k] scale[m, i] P_i(m, t_r)
+    analyse      coefficients[m, i, k] = sum_r ring_r[m, k] scale[m, i] P_i(m, t_r)
+
+Rings stand in tiles, (tiles, orders, channels, LANES): ring r in lane r % LANES of tile r // LANES.
 
 Eight steps are taken for a block of rings that stays in the first cache, then used for every channel k. The recursion
 runs in float64, the sums in the dtype of the channels. Steps come in eights, channels in pairs.
@@ -17,9 +19,9 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-BLOCK = 1024  # bytes of rings: eight steps of them and the sums of a dozen channels fit a first cache of 32 KiB
+BLOCK = 2048  # bytes of rings: less, and entering the loops costs as much as they do; more, and the first cache is full
 EIGHT = 8
-LANES = 32  # rings are taken in multiples of this, so that vectorised loops leave no remainder
+LANES = 16  # rings are taken in multiples of this, so that vectorised loops leave no remainder
 _LIFT = 2.0**-512
 
 # Sums may be reordered and fused so that they vectorise; NaN and infinity still spread as they should.
@@ -127,29 +129,28 @@ def _begin(start, level, t, m, low, count, ring):  # type: ignore[no-untyped-def
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def synthesise(coefficients, start, level, a, b, scale, count, first, stop, t, rings):  # type: ignore[no-untyped-def]
-    """Fill `rings` (orders, channels, rings) from `coefficients` (orders, steps, channels), of one dtype.
+def synthesise(coefficients, start, level, a, b, scale, count, first, stop, t, low, tiles):  # type: ignore[no-untyped-def]
+    """Fill `tiles` of the orders low, low + 1, ... from `coefficients` (orders, steps, channels), of one dtype.
 
     start, level: (orders, rings). a, b, scale: (orders, steps). count, first, stop: (orders,): steps of each order, and
-    its range of rings; the others become 0. t: (rings,); `rings` may be longer.
+    its range of rings; the others become 0. t: (rings,).
     """
-    channels = rings.shape[1]
-    block = BLOCK // rings.itemsize
-    steps = np.empty((EIGHT, block), rings.dtype)
-    sums = np.empty((channels, block), rings.dtype)
-    weights = np.empty((channels, a.shape[1]), rings.dtype)
+    channels = tiles.shape[2]
+    block = BLOCK // tiles.itemsize
+    steps = np.empty((EIGHT, block), tiles.dtype)
+    sums = np.empty((channels, block), tiles.dtype)
+    weights = np.empty((channels, a.shape[1]), tiles.dtype)
     x, last, now, deep = np.empty(block), np.empty(block), np.empty(block), np.empty(block, np.int64)
-    for m in range(rings.shape[0]):
+    for m in range(coefficients.shape[0]):
         for i in range(a.shape[1]):
             for k in range(channels):
                 weights[k, i] = coefficients[m, i, k] * scale[m, i]
-        begin = first[m] // LANES * LANES
-        rings[m, :, :begin] = 0
-        rings[m, :, stop[m] :] = 0
-        for low in range(begin, stop[m], block):
-            n = min(block, stop[m] - low)
-            whole = (n + LANES - 1) // LANES * LANES
-            ready = _begin(start, level, t, m, low, whole, (x, last, now, deep))
+        begin, end = first[m] // LANES, (stop[m] + LANES - 1) // LANES
+        tiles[:begin, low + m] = 0
+        tiles[end:, low + m] = 0
+        for from_ring in range(begin * LANES, end * LANES, block):
+            whole = min(block, end * LANES - from_ring)
+            ready = _begin(start, level, t, m, from_ring, whole, (x, last, now, deep))
             sums[:, :whole] = 0
             for i in range(0, count[m], EIGHT):
                 _advance(steps, x, last, now, a, b, m, i, whole)
@@ -158,27 +159,34 @@ def synthesise(coefficients, start, level, a, b, scale, count, first, stop, t, r
                     ready = _lift(steps, last, now, deep, whole)
                 if before > 0:
                     _accumulate(sums, steps, weights, i, whole)
-            rings[m, :, low : low + n] = sums[:, :n]
+            for i in range(whole // LANES):
+                tile = tiles[from_ring // LANES + i, low + m]
+                for k in range(channels):
+                    for lane in range(LANES):
+                        tile[k, lane] = sums[k, i * LANES + lane]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def analyse(rings, start, level, a, b, scale, count, first, stop, t, coefficients):  # type: ignore[no-untyped-def]
-    """Fill `coefficients` (orders, steps, channels) from `rings` (orders, channels, rings): `synthesise` transposed."""
-    channels = rings.shape[1]
-    block = BLOCK // rings.itemsize
-    steps = np.empty((EIGHT, block), rings.dtype)
-    values = np.empty((channels, block), rings.dtype)
-    weights = np.empty((channels, a.shape[1]), rings.dtype)
+def analyse(tiles, start, level, a, b, scale, count, first, stop, t, low, coefficients):  # type: ignore[no-untyped-def]
+    """Fill `coefficients` (orders, steps, channels) from the orders low, low + 1, ... of `tiles`: `synthesise` transposed."""
+    channels = tiles.shape[2]
+    block = BLOCK // tiles.itemsize
+    steps = np.empty((EIGHT, block), tiles.dtype)
+    values = np.empty((channels, block), tiles.dtype)
+    weights = np.empty((channels, a.shape[1]), tiles.dtype)
     x, last, now, deep = np.empty(block), np.empty(block), np.empty(block), np.empty(block, np.int64)
-    zero = rings.dtype.type(0)
-    for m in range(rings.shape[0]):
+    zero = tiles.dtype.type(0)
+    for m in range(coefficients.shape[0]):
         weights[:] = 0
-        for low in range(first[m] // LANES * LANES, stop[m], block):
-            n = min(block, stop[m] - low)
-            whole = (n + LANES - 1) // LANES * LANES
-            ready = _begin(start, level, t, m, low, whole, (x, last, now, deep))
-            values[:, :n] = rings[m, :, low : low + n]
-            values[:, n:whole] = 0
+        begin, end = first[m] // LANES, (stop[m] + LANES - 1) // LANES
+        for from_ring in range(begin * LANES, end * LANES, block):
+            whole = min(block, end * LANES - from_ring)
+            ready = _begin(start, level, t, m, from_ring, whole, (x, last, now, deep))
+            for i in range(whole // LANES):
+                tile = tiles[from_ring // LANES + i, low + m]
+                for k in range(channels):
+                    for lane in range(LANES):
+                        values[k, i * LANES + lane] = tile[k, lane]
             for i in range(0, count[m], EIGHT):
                 _advance(steps, x, last, now, a, b, m, i, whole)
                 before = ready

@@ -17,6 +17,7 @@ from .grids import Grid
 from .legendre import folded_recursion, odd_factors
 from .packing import root_two
 from .quadrature import mend
+from .tiles import empty_tiles
 
 _PIECE = 2**19  # bytes of rings that the sums over theta take at once
 
@@ -24,31 +25,29 @@ _PIECE = 2**19  # bytes of rings that the sums over theta take at once
 def analyse(values: np.ndarray, grid: Grid, degree: int) -> np.ndarray:
     """((degree + 1)^2, C) from values (rows, columns, C)."""
     channels = values.shape[2]
-    way = row_pairs.way(grid, degree)
-    rings = way.analyse(values, _weights(grid, values.dtype))
+    tiles = row_pairs.way(grid, degree).analyse(values, _weights(grid, values.dtype))
     recursion = folded_recursion(grid, degree)
     factors = odd_factors(degree, recursion.a.shape[1])
-    turn = _turn(grid, degree, 1, values.dtype)
+    norms = _norms(degree, values.dtype)
     coefficients = np.empty(((degree + 1) ** 2, channels), values.dtype)
-    for orders in _orders(degree, rings[0].nbytes):
-        mend(rings[orders, :, : recursion.t.size], grid, degree)
-        kernels.unpack(recursion.analyse(rings[orders], orders), degree, *factors, turn, orders.start, coefficients)
+    for orders in _orders(tiles):
+        mend(tiles, orders, grid, degree)
+        kernels.unpack(recursion.project(tiles, orders), degree, *factors, norms, orders.start, coefficients)
     return coefficients
 
 
 def synthesise(coefficients: np.ndarray, grid: Grid, degree: int) -> np.ndarray:
     """Values (rows, columns, C) from coefficients ((degree + 1)^2, C)."""
-    channels = coefficients.shape[1]
-    way = row_pairs.way(grid, degree)
+    channels, dtype = coefficients.shape[1], coefficients.dtype
     recursion = folded_recursion(grid, degree)
     factors = odd_factors(degree, recursion.a.shape[1])
-    turn = _turn(grid, degree, -1, coefficients.dtype)
-    rings = row_pairs.empty_rings(grid, degree, channels, coefficients.dtype)
-    for orders in _orders(degree, rings[0].nbytes):
-        packed = np.empty((orders.stop - orders.start, recursion.a.shape[1], 4 * channels), coefficients.dtype)
-        kernels.pack(coefficients, degree, *factors, turn, orders.start, packed)
-        recursion.synthesise(packed, orders, rings[orders])
-    return way.synthesise(rings, _cosines(grid, rings.dtype))
+    norms = _norms(degree, dtype)
+    tiles = empty_tiles(degree + 1, 4 * channels, recursion.t.size, dtype)
+    for orders in _orders(tiles):
+        packed = np.empty((orders.stop - orders.start, recursion.a.shape[1], 4 * channels), dtype)
+        kernels.pack(coefficients, degree, *factors, norms, orders.start, packed)
+        recursion.fill(tiles, packed, orders)
+    return row_pairs.way(grid, degree).synthesise(tiles, _cosines(grid, dtype))
 
 
 # The next three are kept: where other work has used the caches, making them takes as long as the sums over theta.
@@ -72,13 +71,15 @@ def _cosines(grid: Grid, dtype: np.dtype) -> np.ndarray:
 
 
 @lru_cache(maxsize=8)
-def _turn(grid: Grid, degree: int, sign: int, dtype: np.dtype) -> np.ndarray:
-    """The turn of `row_pairs` for each order, times the norm of the real harmonics; (degree + 1,)."""
-    turn: np.ndarray = row_pairs.way(grid, degree).turn(sign) * root_two(degree)
-    return turn.astype(np.complex64 if dtype == np.float32 else np.complex128)
+def _norms(degree: int, dtype: np.dtype) -> np.ndarray:
+    """What the real harmonics have beside lambda, (2, degree + 1): of cosines, and of sines, of which order 0 has none."""
+    norms = np.stack((root_two(degree), root_two(degree)))
+    norms[1, 0] = 0
+    return norms.astype(dtype)
 
 
-def _orders(degree: int, size: int) -> Iterator[slice]:
-    """Slices that cover the orders to `degree`, of `size` bytes each; every slice starts at an even one."""
-    step = max(2, _PIECE // size // 2 * 2)
-    return (slice(low, min(low + step, degree + 1)) for low in range(0, degree + 1, step))
+def _orders(tiles: np.ndarray) -> Iterator[slice]:
+    """Slices that cover the orders; every slice starts at an even one."""
+    orders = tiles.shape[1]
+    step = max(2, _PIECE // (tiles.nbytes // orders) // 2 * 2)
+    return (slice(low, min(low + step, orders)) for low in range(0, orders, step))

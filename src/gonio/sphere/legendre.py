@@ -27,6 +27,7 @@ import numpy as np
 from .._kernels import legendre as kernels
 from ..arrays import Array
 from .grids import Grid
+from .tiles import empty_tiles, tiled, untiled
 
 _LEVEL = 512  # a number is start 2^(_LEVEL level), as in the kernels
 _NEGLIGIBLE = 54.0  # exp(-54) = 4e-24: beside it a norm of up to sqrt(degree) and the like has no say
@@ -48,19 +49,24 @@ class Recursion:
     kept: dict[tuple[str, str], list[Array]] = dataclasses.field(default_factory=dict, repr=False)
     """Tables of all orders for other libraries, by dtype and device (whose names tell the libraries apart)."""
 
-    def synthesise(
-        self, coefficients: np.ndarray, orders: slice = slice(None), rings: np.ndarray | None = None
-    ) -> np.ndarray:
-        """(orders, steps, channels) -> (orders, channels, rings), for all orders or some, into `rings` where given."""
-        if rings is None:
-            rings = np.empty((coefficients.shape[0], coefficients.shape[2], self.t.size), coefficients.dtype)
-        kernels.synthesise(coefficients, *self._arguments(orders), rings)
-        return rings
+    def synthesise(self, coefficients: np.ndarray) -> np.ndarray:
+        """(orders, steps, channels) -> rings (orders, channels, rings)."""
+        tiles = empty_tiles(coefficients.shape[0], coefficients.shape[2], self.t.size, coefficients.dtype)
+        self.fill(tiles, coefficients, slice(0, coefficients.shape[0]))
+        return untiled(tiles, self.t.size)
 
-    def analyse(self, rings: np.ndarray, orders: slice = slice(None)) -> np.ndarray:
-        """(orders, channels, rings) -> (orders, steps, channels), for all orders or some."""
-        coefficients = np.empty((rings.shape[0], self.a.shape[1], rings.shape[1]), rings.dtype)
-        kernels.analyse(rings, *self._arguments(orders), coefficients)
+    def fill(self, tiles: np.ndarray, coefficients: np.ndarray, orders: slice) -> None:
+        """The same for some orders, into `tiles` of all."""
+        kernels.synthesise(coefficients, *self._arguments(orders), tiles)
+
+    def analyse(self, rings: np.ndarray) -> np.ndarray:
+        """Rings (orders, channels, rings) -> (orders, steps, channels)."""
+        return self.project(tiled(rings), slice(0, rings.shape[0]))
+
+    def project(self, tiles: np.ndarray, orders: slice) -> np.ndarray:
+        """The same for some orders, from `tiles` of all."""
+        coefficients = np.empty((orders.stop - orders.start, self.a.shape[1], tiles.shape[2]), tiles.dtype)
+        kernels.analyse(tiles, *self._arguments(orders), coefficients)
         return coefficients
 
     def table(self, m: int) -> np.ndarray:
@@ -70,9 +76,9 @@ class Recursion:
         table[self.count[m] :] = 0
         return table
 
-    def _arguments(self, orders: slice) -> tuple[np.ndarray, ...]:
+    def _arguments(self, orders: slice) -> tuple[np.ndarray | int, ...]:
         fields = (self.start, self.level, self.a, self.b, self.scale, self.count, self.first, self.stop)
-        return *(x[orders] for x in fields), self.t
+        return *(x[orders] for x in fields), self.t, orders.start
 
 
 @lru_cache(maxsize=8)

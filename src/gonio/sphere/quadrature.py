@@ -18,8 +18,10 @@ from functools import lru_cache
 
 import numpy as np
 
+from .._kernels import mending as kernels
 from ..arrays import Array, like, namespace
 from .grids import Grid, LatLong
+from .tiles import tiled
 
 
 def weighted(rings: Array, grid: Grid, degree: int, spin: int, symmetry: int | None = None) -> Array:
@@ -41,21 +43,30 @@ def weighted(rings: Array, grid: Grid, degree: int, spin: int, symmetry: int | N
     return plain + xp.take(xp.concat(mended, axis=0), order, axis=0)
 
 
-def mend(rings: np.ndarray, grid: Grid, degree: int) -> None:
-    """Put into `rings` (orders from an even one, 4 C, pairs), sums and differences of mirror rows which have their
+def mend(tiles: np.ndarray, orders: slice, grid: Grid, degree: int) -> None:
+    """Put into some orders, from an even one on, of the `tiles` of sums and differences of mirror rows, which have their
     plain weights already (the differences times cos theta), what these weights miss."""
     if not _mends(grid, degree):
         return
-    for symmetry, half in enumerate(np.split(rings, 2, axis=1)):
-        factors = _factors(grid, rings.shape[2], symmetry)
+    for symmetry in (0, 1):
         for odd in (0, 1):
-            waves, spread = _mending(grid, degree, odd, symmetry)
-            if waves.size:
-                half[odd::2] += (half[odd::2] @ like((waves / factors).T, rings)) @ like(spread, rings)
+            waves, spread = _tiled_mending(grid, degree, odd, symmetry, tiles.dtype)
+            low = symmetry * tiles.shape[2] // 2
+            kernels.mend(tiles, orders.start + odd, orders.stop, low, waves, spread)
 
 
 def _mends(grid: Grid, degree: int) -> bool:
+    """Whether the plain weights miss anything."""
     return isinstance(grid, LatLong) and 2 * degree >= grid.rows
+
+
+@lru_cache(maxsize=16)
+def _tiled_mending(grid: Grid, degree: int, odd: int, symmetry: int, dtype: np.dtype) -> tuple[np.ndarray, np.ndarray]:
+    """B and M B for rings that have their plain weights, each (frequencies, tiles, LANES)."""
+    waves, spread = _mending(grid, degree, odd, symmetry)
+    waves = waves / _factors(grid, waves.shape[1], symmetry)
+    first, second = (tiled(x[:, None, :])[:, :, 0].swapaxes(0, 1).astype(dtype) for x in (waves, spread))
+    return np.ascontiguousarray(first), np.ascontiguousarray(second)
 
 
 def _factors(grid: Grid, rows: int, symmetry: int | None) -> np.ndarray:

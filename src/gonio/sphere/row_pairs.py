@@ -1,7 +1,8 @@
-"""Fourier sums over the rows of real images, two mirror rows at a time, by the kernels, for NumPy.
+"""Fourier sums over the rows of real images, in pairs of mirror rows, by the kernels, for NumPy.
 
-    rings   (degree + 1, 4 C, northern rows and the equator): for every order m sum over c of f(theta_r, phi_c) times
-            cos or sin(m phi_c): cos and sin of the sums of a row and its mirror image, then of their differences
+    tiles   (tiles, degree + 1, 4 C, LANES), as in `tiles.py`, of the northern rows and the equator: for every order m
+            sum over c of f(theta_r, phi_c) times cos or sin(m phi_c): cos and sin of the sums of a row and its mirror
+            image, then of their differences
 
 By fast Fourier transforms; or, for a few orders of many columns, by products with matrices of cosines and sines, for
 which a turn is folded fourfold. The pairs are taken some at a time, so that what lies between stays in the cache.
@@ -17,7 +18,9 @@ from functools import lru_cache
 import numpy as np
 
 from .._kernels import row_pairs as kernels
+from .fourier import Transforms
 from .grids import Grid
+from .tiles import LANES, empty_tiles
 
 _PIECE = 2**19  # bytes of rows taken at once
 
@@ -28,33 +31,29 @@ class Matrices:
     def __init__(self, grid: Grid, degree: int) -> None:
         self.grid, self.degree = grid, degree
 
-    def turn(self, sign: int) -> np.ndarray:
-        """What cosine + i sine of each order still have to be multiplied by, (degree + 1,): 1."""
-        return np.ones(self.degree + 1, np.complex128)
-
     def analyse(self, values: np.ndarray, weights: np.ndarray) -> np.ndarray:
-        """Rings of values (rows, columns, C), times `weights` (2, pairs); the equator counts twice."""
+        """Tiles of values (rows, columns, C), times `weights` (2, pairs); the equator counts twice."""
         channels = values.shape[2]
         image = np.ascontiguousarray(values).reshape(self.grid.rows, -1)
-        matrices, sums = self._matrices(values.dtype), self._sums(channels, values.dtype)
+        tiles = empty_tiles(self.degree + 1, 4 * channels, weights.shape[1], values.dtype)
+        matrices, sums = self._matrices(values.dtype), self._sums(tiles)
         for pairs in _pieces(self.grid, image[:2].nbytes):
             quarters = self._quarters(channels, pairs, values.dtype)
             kernels.fold(image, weights, pairs.start, *quarters)
             np.matmul(quarters.reshape(4, -1, quarters.shape[3]), matrices.mT, out=_flat(sums, pairs))
-        rings = empty_rings(self.grid, self.degree, channels, values.dtype)
-        for ring, part in self._orders(rings, sums):
-            ring[...] = part
-        return rings
+        for tile, part in self._orders(tiles, sums):
+            tile[...] = part
+        return tiles
 
-    def synthesise(self, rings: np.ndarray, cosines: np.ndarray) -> np.ndarray:
-        """Values (rows, columns, C) from rings whose differences have yet to be multiplied by `cosines`."""
-        channels = rings.shape[1] // 4
-        matrices, sums = self._matrices(rings.dtype), self._sums(channels, rings.dtype)
-        for ring, part in self._orders(rings, sums):
-            part[...] = ring
-        image = np.empty((self.grid.rows, self.grid.columns * channels), rings.dtype)
+    def synthesise(self, tiles: np.ndarray, cosines: np.ndarray) -> np.ndarray:
+        """Values (rows, columns, C) from tiles whose differences have yet to be multiplied by `cosines`."""
+        channels = tiles.shape[2] // 4
+        matrices, sums = self._matrices(tiles.dtype), self._sums(tiles)
+        for tile, part in self._orders(tiles, sums):
+            part[...] = tile
+        image = np.empty((self.grid.rows, self.grid.columns * channels), tiles.dtype)
         for pairs in _pieces(self.grid, image[:2].nbytes):
-            quarters = self._quarters(channels, pairs, rings.dtype)
+            quarters = self._quarters(channels, pairs, tiles.dtype)
             np.matmul(_flat(sums, pairs), matrices, out=quarters.reshape(4, -1, quarters.shape[3]))
             kernels.unfold(*quarters, cosines, pairs.start, image)
         return image.reshape(self.grid.rows, self.grid.columns, channels)
@@ -62,63 +61,21 @@ class Matrices:
     def _matrices(self, dtype: np.dtype) -> np.ndarray:
         return _waves(self.degree, self.grid.columns, dtype)
 
-    def _sums(self, channels: int, dtype: np.dtype) -> np.ndarray:
+    def _sums(self, tiles: np.ndarray) -> np.ndarray:
         """(quarters, pairs, 2 C, orders of a quarter); where the odd orders are one fewer, a 0 stands last."""
-        return np.zeros((4, (self.grid.rows + 1) // 2, 2 * channels, self.degree // 2 + 1), dtype)
+        return np.zeros((4, tiles.shape[0] * LANES, tiles.shape[2] // 2, self.degree // 2 + 1), tiles.dtype)
 
     def _quarters(self, channels: int, pairs: slice, dtype: np.dtype) -> np.ndarray:
         return np.empty((4, pairs.stop - pairs.start, 2 * channels, self.grid.columns // 4), dtype)
 
-    def _orders(self, rings: np.ndarray, sums: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """Views of the same numbers in `rings` and in `sums`, (orders, 2, C, pairs), for each quarter."""
-        pairs = sums.shape[1]
-        parts = rings.reshape(rings.shape[0], 2, 2, -1, rings.shape[2])[..., :pairs]
+    def _orders(self, tiles: np.ndarray, sums: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """Views of the same numbers in `tiles` and in `sums`, (tiles, orders, 2, C, LANES), for each quarter."""
+        parts = tiles.reshape(*tiles.shape[:2], 2, 2, -1, LANES)
         for k in range(4):
             sine, odd = divmod(k, 2)
-            ring = parts[odd::2, :, sine]
-            yield ring, sums[k].T[: ring.shape[0]].reshape(ring.shape[0], 2, -1, pairs)
-
-
-class Transforms:
-    """The way by fast Fourier transforms."""
-
-    def __init__(self, grid: Grid, degree: int) -> None:
-        self.grid, self.degree = grid, degree
-
-    def turn(self, sign: int) -> np.ndarray:
-        """What cosine + i sine of each order still have to be multiplied by, (degree + 1,).
-
-        Column 0 stands half a step from phi = 0; and irfft counts every m > 0 twice.
-        """
-        order = np.arange(self.degree + 1)
-        turn: np.ndarray = np.exp(1j * sign * order * (math.pi / self.grid.columns))
-        return turn if sign > 0 else turn * np.where(order > 0, 0.5, 1)
-
-    def analyse(self, values: np.ndarray, weights: np.ndarray) -> np.ndarray:
-        """Rings of values (rows, columns, C), times `weights` (2, pairs); the equator counts twice."""
-        from scipy.fft import rfft
-
-        channels = values.shape[2]
-        image = np.ascontiguousarray(values).reshape(self.grid.rows, -1)
-        rings = empty_rings(self.grid, self.degree, channels, values.dtype)
-        for pairs in _pieces(self.grid, image[:2].nbytes):
-            lines = np.empty((2 * channels, pairs.stop - pairs.start, self.grid.columns), values.dtype)
-            kernels.gather(image, weights, pairs.start, lines)
-            kernels.collect(rfft(lines), pairs.start, rings)
-        return rings
-
-    def synthesise(self, rings: np.ndarray, cosines: np.ndarray) -> np.ndarray:
-        """Values (rows, columns, C) from rings whose differences have yet to be multiplied by `cosines`."""
-        from scipy.fft import irfft
-
-        channels = rings.shape[1] // 4
-        kind = np.complex64 if rings.dtype == np.float32 else np.complex128
-        image = np.empty((self.grid.rows, self.grid.columns * channels), rings.dtype)
-        for pairs in _pieces(self.grid, image[:2].nbytes):
-            waves = np.empty((2 * channels, pairs.stop - pairs.start, self.grid.columns // 2 + 1), kind)
-            kernels.distribute(rings, pairs.start, waves)
-            kernels.scatter(irfft(waves, n=self.grid.columns, norm="forward"), cosines, pairs.start, image)
-        return image.reshape(self.grid.rows, self.grid.columns, channels)
+            tile = parts[:, odd::2, :, sine]
+            part = sums[k].reshape(tiles.shape[0], LANES, 2, tile.shape[3], -1).transpose(0, 4, 2, 3, 1)
+            yield tile, part[:, : tile.shape[1]]
 
 
 def way(grid: Grid, degree: int) -> Matrices | Transforms:
@@ -128,12 +85,6 @@ def way(grid: Grid, degree: int) -> Matrices | Transforms:
     """
     few = grid.columns % 4 == 0 and degree <= 8 * math.log2(grid.columns)
     return Matrices(grid, degree) if few else Transforms(grid, degree)
-
-
-def empty_rings(grid: Grid, degree: int, channels: int, dtype: np.dtype) -> np.ndarray:
-    """Memory for rings, longer than the pairs of rows by 16 or more: the same pair of all orders, a power of two apart,
-    would have to share a few lines of the cache."""
-    return np.empty((degree + 1, 4 * channels, ((grid.rows + 1) // 2 + 31) // 16 * 16), dtype)
 
 
 def _flat(sums: np.ndarray, pairs: slice) -> np.ndarray:
