@@ -1,7 +1,7 @@
 """Fourier sums along the rows of an image, sixteen pairs of rows at once: the lanes of a vector are rows, not samples.
 
-    f_c = sum over m of Z_m e^{2 pi i m (c + 1/2) / columns},   |m| <= degree,   columns = phases n,   c = phases i + s
-        = sum over k < n of X_k e^{2 pi i k i / n},   X_k = sum over m = k (mod n) of Z_m e^{2 pi i m (s + 1/2) / columns}
+    f_c = sum over m of Z_m e^{2 pi i m (c + 1/2) / columns},   |m| <= degree; columns = phases n, c = phases i + s
+        = sum over k < n of X_k e^{2 pi i k i / n}, X_k = sum of Z_m e^{2 pi i m (s + 1/2) / columns}, m = k (mod n)
 
 with n >= 2 degree: each phase s is a transform of n points, and orders beyond the degree cost nothing. A northern row
 is the real part of f and its mirror image the imaginary part, so that a pair takes one complex transform.

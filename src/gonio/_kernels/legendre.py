@@ -168,7 +168,7 @@ def synthesise(coefficients, start, level, a, b, scale, count, first, stop, t, l
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def analyse(tiles, start, level, a, b, scale, count, first, stop, t, low, coefficients):  # type: ignore[no-untyped-def]
-    """Fill `coefficients` (orders, steps, channels) from the orders low, low + 1, ... of `tiles`: `synthesise` transposed."""
+    """Fill `coefficients` from the orders low, low + 1, ... of `tiles`: `synthesise` transposed."""
     channels = tiles.shape[2]
     block = BLOCK // tiles.itemsize
     steps = np.empty((EIGHT, block), tiles.dtype)

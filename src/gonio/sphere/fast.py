@@ -72,7 +72,7 @@ def _cosines(grid: Grid, dtype: np.dtype) -> np.ndarray:
 
 @lru_cache(maxsize=8)
 def _norms(degree: int, dtype: np.dtype) -> np.ndarray:
-    """What the real harmonics have beside lambda, (2, degree + 1): of cosines, and of sines, of which order 0 has none."""
+    """What the real harmonics have beside lambda, (2, degree + 1): cosines, and sines, of which order 0 has none."""
     norms = np.stack((root_two(degree), root_two(degree)))
     norms[1, 0] = 0
     return norms.astype(dtype)

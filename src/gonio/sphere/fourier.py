@@ -1,7 +1,7 @@
 """Fourier sums over the rows of real images by fast transforms, for NumPy: `row_pairs.py` tells when.
 
-Written for this use rather than taken from SciPy: the lanes of a vector are sixteen pairs of rows, which is how the sums
-over theta leave and want them, orders beyond the degree cost nothing, and pixels are written once.
+Written for this use rather than taken from SciPy: the lanes of a vector are sixteen pairs of rows, which is how the
+sums over theta leave and want them, and orders beyond the degree cost nothing.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 
 from .._kernels import fourier as kernels
 from .grids import Grid
-from .tiles import empty_tiles
+from .tiles import LANES, empty_tiles
 
 _LINE = 64  # bytes
 
@@ -49,10 +49,10 @@ def _by_parts(tiles: np.ndarray) -> np.ndarray:
 
 def _lanes(pairs: np.ndarray, channels: int) -> np.ndarray:
     """Numbers for each pair (..., pairs) as lanes, the same for every channel: (tiles, ..., C LANES)."""
-    whole = -(-pairs.shape[-1] // kernels.LANES) * kernels.LANES
+    whole = -(-pairs.shape[-1] // LANES) * LANES
     padded = np.zeros((*pairs.shape[:-1], whole), pairs.dtype)
     padded[..., : pairs.shape[-1]] = pairs
-    lanes = np.moveaxis(padded.reshape(*pairs.shape[:-1], -1, kernels.LANES), -2, 0)
+    lanes = np.moveaxis(padded.reshape(*pairs.shape[:-1], -1, LANES), -2, 0)
     return np.tile(lanes, channels)
 
 
@@ -63,7 +63,7 @@ def _plan(degree: int, columns: int, channels: int, dtype: np.dtype) -> tuple[np
     radices = _radices(n)
     element = np.arange(n + 1)
     gap = _LINE // dtype.itemsize if n % 4 == 0 else 0
-    at = element * (channels * kernels.LANES) + element // max(n // 4, 1) * gap
+    at = element * (channels * LANES) + element // max(n // 4, 1) * gap
     factors, l = [np.empty(0, complex)], n
     for r in radices:
         l //= r

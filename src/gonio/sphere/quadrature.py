@@ -44,8 +44,8 @@ def weighted(rings: Array, grid: Grid, degree: int, spin: int, symmetry: int | N
 
 
 def mend(tiles: np.ndarray, orders: slice, grid: Grid, degree: int) -> None:
-    """Put into some orders, from an even one on, of the `tiles` of sums and differences of mirror rows, which have their
-    plain weights already (the differences times cos theta), what these weights miss."""
+    """Put into some orders, from an even one on, of the `tiles` of sums and differences of mirror rows, which have
+    their plain weights already (the differences times cos theta), what these weights miss."""
     if not _mends(grid, degree):
         return
     for symmetry in (0, 1):

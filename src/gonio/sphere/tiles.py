@@ -11,7 +11,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from .._kernels.legendre import LANES
+from .._kernels import legendre as kernels
+
+LANES = kernels.LANES
 
 
 def empty_tiles(orders: int, channels: int, rings: int, dtype: np.dtype) -> np.ndarray:
