@@ -9,6 +9,11 @@ surface, so that coefficients fall off slowly in p where it does not vanish at g
 `sphere/convolution.py`. The quadrature is Gauss's in cos theta over the upper half and equal steps in phi: a lobe
 narrower than its spacing, about pi / (2 samples), is missed.
 
+About the mirror direction R of wo in place of the normal (RH 2.3.4, 5.3.1) glossy BRDFs hardly depend on where the eye
+is. Then wi and wo are counted from R, with x towards wo: the same light field, in which the normal stands theta_o off
+R, and wo 2 theta_o. The coefficients turn with it, rho_lk about R = sum over q of d^l_kq(theta_o) rho_lq about n; the
+exit angle 2 theta_o runs to pi, and sin(2 theta_o) d(2 theta_o) weighs it as the picture of a ball does.
+
 NumPy only: evaluating the BRDF takes half to seven tenths of the time. BRDFs whose parameters are arrays of another
 library are refused, since gradients would end here.
 """
@@ -25,6 +30,7 @@ from ..arrays import Array, is_numpy
 from ..directions import from_spherical
 from ..errors import ArrayError, ParameterError
 from ..sphere.harmonics import complex_harmonics, harmonics, require_degree
+from ..sphere.wigner import wigner_d
 from .model import BRDF
 
 _BLOCK = 1 << 18  # BRDF values at a time: a few megabytes
@@ -43,8 +49,8 @@ def transfer(
     theta, cosine, weight = _polar(samples)
     measure = weight * cosine if reciprocal else weight
     highest = min(degree, exit_degree)
-    at_exits = _at_exits(brdf, degree, theta, samples)[:, :, : highest + 1]
-    orders = _meridian(exit_degree, theta)
+    at_exits = _at_exits(brdf, degree, theta, samples)[0][:, :, : highest + 1]
+    orders = meridian(exit_degree, theta)
     result = np.empty((degree + 1, exit_degree + 1, highest + 1, at_exits.shape[-1]))
     for q in range(highest + 1):
         result[:, :, q] = np.einsum("lkc,kp->lpc", at_exits[:, :, q], measure[:, None] * orders[:, :, q])
@@ -60,7 +66,55 @@ def transfer_at(brdf: BRDF, degree: int, theta_o: Array, *, samples: int | None 
     theta_o = np.asarray(theta_o, dtype=np.float64)
     if theta_o.ndim != 1 or not np.all((theta_o >= 0) & (theta_o <= math.pi / 2)):
         raise ParameterError("theta_o is not a list of angles in [0, pi/2].")
-    return _at_exits(brdf, degree, theta_o, _samples(samples, degree, 0))
+    return _at_exits(brdf, degree, theta_o, _samples(samples, degree, 0))[0]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class ExitLobes:
+    """What a BRDF reflects at K exit angles, as harmonics of where the light is: rho_lq(theta_o) of RH 2.56.
+
+    angle: (K,) from the axis to wo, radians. cosine: (K,) of theta_o. weight: (K,), summing to 2: how much of the
+    picture of a ball each exit angle fills. coefficients: (degree+1, K, degree+1, C), q = 0..degree.
+    energy: (K, C), 2 pi times the integral of (f cos theta_i)^2 over wi: all rho_lq^2, q of both signs, summed.
+    """
+
+    angle: np.ndarray
+    cosine: np.ndarray
+    weight: np.ndarray
+    coefficients: np.ndarray
+    energy: np.ndarray
+
+    def about_mirror(self) -> ExitLobes:
+        """The same, of lobes about the normal, counted from the mirror direction. RH 2.3.4."""
+        return dataclasses.replace(
+            self, angle=2 * self.angle, coefficients=_about_mirror(self.coefficients, self.angle)
+        )
+
+
+def exit_lobes(brdf: BRDF, degree: int, exits: int, *, samples: int | None = None) -> ExitLobes:
+    """The lobes of an isotropic BRDF about the normal, at Gauss's nodes in cos(2 theta_o). Raises as `transfer`."""
+    nodes, weight = np.polynomial.legendre.leggauss(exits)
+    theta = np.arccos(nodes) / 2
+    coefficients, energy = _at_exits(brdf, degree, theta, _samples(samples, degree, 0))
+    return ExitLobes(theta, np.cos(theta), weight, coefficients, energy)
+
+
+def mirror_transfer(
+    brdf: BRDF, degree: int, exit_degree: int, *, reciprocal: bool = False, samples: int | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """rho_lpq about the mirror direction, (degree+1, exit_degree+1, min+1, C), and the BRDF's energy (C,). RH 5.18.
+
+    Of the energy, the integral of rho^2 over both spheres, the sum of rho_lpq^2, q of both signs, is the part that
+    these degrees carry. `reciprocal` takes cos theta_o in, as RH 5.34 does. Raises as `transfer` does.
+    """
+    require_degree(exit_degree, "exit_degree")
+    lobes = exit_lobes(brdf, degree, max(4 * exit_degree, 48), samples=samples).about_mirror()
+    factor = lobes.cosine if reciprocal else np.ones_like(lobes.cosine)
+    highest = min(degree, exit_degree)
+    orders = meridian(exit_degree, lobes.angle)[:, :, : highest + 1]
+    turned = lobes.coefficients[:, :, : highest + 1]
+    rho = np.einsum("lkqc,k,kpq->lpqc", turned, lobes.weight * factor, orders, optimize=True) * math.sqrt(2 * math.pi)
+    return rho, (lobes.weight * factor**2) @ lobes.energy
 
 
 def anisotropic_transfer(
@@ -103,8 +157,8 @@ def mirror(degree: int) -> np.ndarray:
     return coefficients
 
 
-def _at_exits(brdf: BRDF, degree: int, theta_o: np.ndarray, samples: int) -> np.ndarray:
-    """rho_lq(theta_o): (degree+1, K, degree+1, C)."""
+def _at_exits(brdf: BRDF, degree: int, theta_o: np.ndarray, samples: int) -> tuple[np.ndarray, np.ndarray]:
+    """rho_lq(theta_o), (degree+1, K, degree+1, C), and 2 pi times the integral of (f cos theta_i)^2 over wi, (K, C)."""
     require_degree(degree)
     _require_numpy(brdf, type(brdf).__name__)
     _require_isotropic(brdf)
@@ -115,19 +169,30 @@ def _at_exits(brdf: BRDF, degree: int, theta_o: np.ndarray, samples: int) -> np.
     waves = np.cos(np.arange(degree + 1)[:, None] * phi) * (2 * math.pi / count)
     wi = from_spherical(theta[:, None], phi)
     wo = from_spherical(theta_o, 0.0)
-    incident = _meridian(degree, theta) * (weight * cosine)[:, None, None]
-    parts = []
+    incident = meridian(degree, theta) * (weight * cosine)[:, None, None]
+    parts, energies = [], []
     step = max(1, _BLOCK // (count * samples))
     for start in range(0, len(wo), step):
         f = brdf.f(wi, wo[start : start + step, None, None])
         parts.append(np.einsum("qj,kijc->kiqc", waves, f, optimize=True))
+        energies.append(np.einsum("i,kijc,kijc->kc", weight * cosine**2, f, f, optimize=True))
     spectra = np.concatenate(parts)
     result: np.ndarray = np.einsum("ilq,kiqc->lkqc", incident, spectra, optimize=True)
-    return result * math.sqrt(2 * math.pi)
+    return result * math.sqrt(2 * math.pi), np.concatenate(energies) * (4 * math.pi**2 / count)
 
 
-def _meridian(degree: int, theta: np.ndarray) -> np.ndarray:
-    """Y_lq(theta, 0), complex harmonics' real values there: (N, degree+1, degree+1), zero where q > l."""
+def _about_mirror(at_exits: np.ndarray, theta_o: np.ndarray) -> np.ndarray:
+    """rho_lq(theta_o), (degree+1, K, degree+1, C), about R."""
+    turned = np.zeros_like(at_exits)
+    for l in range(at_exits.shape[0]):
+        q = np.arange(-l, l + 1)
+        both = at_exits[l][:, np.abs(q)] * np.where(q < 0, (-1.0) ** q, 1.0)[:, None]
+        turned[l, :, : l + 1] = wigner_d(l, theta_o)[:, l:] @ both
+    return turned
+
+
+def meridian(degree: int, theta: np.ndarray) -> np.ndarray:
+    """Y_lq(theta, 0) of the complex harmonics, real there: angles (N,) -> (N, degree+1, degree+1), zero where q > l."""
     real = harmonics(degree, from_spherical(theta, 0.0))
     table = np.zeros((len(theta), degree + 1, degree + 1))
     for l in range(degree + 1):

@@ -1,0 +1,237 @@
+"""Spherical harmonic reflection maps: what any isotropic BRDF makes of an environment, for all normals and views, RH 5.4.
+
+    B(n, wo) = sum over lobes of g(theta_o) sum over p, s of b_ps(a) Y_ps(wo),     a = n or the mirror direction of wo
+
+wo is in the world's frame (the global form of RH 5.11), so that for a distant eye the sum over p, s is one reflection
+map (RH 5.35). Each lobe of the BRDF is expanded by itself, about what suits it; `orders.py` chooses about what, and how
+far. Maps are made from their coefficients (`sphere/reflected.py`), which are what is kept, turned and written.
+
+Shadows, near light and light between surfaces are not here.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import warnings
+from functools import cached_property, lru_cache
+from typing import Any
+
+import numpy as np
+
+from .._kernels import expansion as kernels
+from ..arrays import Array, floats, frozen, is_numpy, like, require_broadcast, to_numpy
+from ..brdf.harmonic import exit_lobes
+from ..brdf.model import BRDF
+from ..directions import dot, reflect, require_unit
+from ..errors import AccuracyWarning, ParameterError
+from ..lights.environment import Environment
+from ..lights.mappings import LatLongMap
+from ..sphere.grids import LatLong
+from ..sphere.harmonics import degree_of, degrees_and_orders, harmonics, power_spectrum
+from ..sphere.reflected import world_coefficients
+from ..sphere.rotation import rotate
+from ..sphere.transform import synthesis
+from .orders import GRAZING, About, expansion, light_field_energy, unseen
+
+_DEGREES = 32, 128  # harmonics of the light at first, and at most
+_ROWS = 16, 512
+_EXITS = 48  # angles at which a BRDF is looked at
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class ReflectedLobe:
+    """What one lobe of a BRDF reflects. coefficients: ((J+1)^2, (P+1)^2, C), real harmonics of a and of wo.
+
+    `exit_cosine`: they are those of B cos theta_o. `degree`: F, the light's; J = F + P.
+    """
+
+    coefficients: Array
+    about: About
+    exit_cosine: bool
+
+    @property
+    def exit_degree(self) -> int:
+        """P."""
+        return math.isqrt(self.coefficients.shape[1]) - 1
+
+    @property
+    def degree(self) -> int:
+        """F."""
+        return degree_of(self.coefficients) - self.exit_degree
+
+    def radiance(self, n: Array, wo: Array) -> Array:
+        """B (N, C) at unit normals and directions to the eye (N, 3); arrays of any library, by the series itself."""
+        _, n, wo = floats(n, wo)
+        c = like(self.coefficients, n) if is_numpy(self.coefficients) else self.coefficients
+        facing = harmonics(degree_of(c), self._axis(n, wo))
+        terms = (facing @ c.reshape(c.shape[0], -1)).reshape(-1, *c.shape[1:])
+        return self._gain(n, wo)[:, None] * (harmonics(self.exit_degree, wo)[:, :, None] * terms).sum(axis=1)
+
+    def maps(self, rows: int) -> np.ndarray:
+        """b_ps on a lat-long grid, (rows, 2 rows, (P+1)^2, C)."""
+        c = to_numpy(self.coefficients)
+        flat = synthesis(c.reshape(c.shape[0], -1), LatLong(rows, 2 * rows))
+        return to_numpy(flat).reshape(rows, 2 * rows, *c.shape[1:])
+
+    def seen_from(self, wo: Array, rows: int) -> np.ndarray:
+        """sum of b_ps Y_ps(wo) for one distant eye, (rows, 2 rows, C): B by a, without g. RH 5.35."""
+        c = to_numpy(self.coefficients)
+        one = np.einsum("jtc,t->jc", c, harmonics(self.exit_degree, to_numpy(wo)))
+        return to_numpy(synthesis(one.astype(c.dtype), LatLong(rows, 2 * rows)))
+
+    def rotated(self, rotation: Array) -> ReflectedLobe:
+        """Turned with its light: B'(R n, R wo) = B(n, wo)."""
+        c = self.coefficients
+        terms = c.shape[1]
+        facing = rotate(c.reshape(c.shape[0], -1), rotation).reshape(c.shape)
+        both = rotate(facing.swapaxes(0, 1).reshape(terms, -1), rotation)
+        return dataclasses.replace(self, coefficients=both.reshape(terms, c.shape[0], -1).swapaxes(0, 1))
+
+    def _axis(self, n: Array, wo: Array) -> Array:
+        return reflect(wo, n) if self.about is About.MIRROR else n
+
+    def _gain(self, n: Array, wo: Array) -> Array:
+        xp, cosine = floats(dot(n, wo))
+        return 1 / xp.clip(cosine, GRAZING, None) if self.exit_cosine else xp.ones_like(cosine)
+
+    @cached_property
+    def _rows(self) -> int:
+        """Rows between which bilinear look-ups miss .5 % rms of what the maps hold.
+
+        Halfway between samples d apart a wave of degree j is short by (j d)^2 / 8 of its height, .0913 (j d)^2 rms.
+        """
+        j = degrees_and_orders(degree_of(self.coefficients))[0]
+        energy = (to_numpy(self.coefficients) ** 2).sum(axis=(1, 2))
+        curvature = math.sqrt(float(np.sum((j * (j + 1.0)) ** 2 * energy) / max(float(np.sum(energy)), 1e-300)))
+        rows = math.pi * math.sqrt(0.0913 * curvature / 0.005)
+        least = max(_ROWS[0], degree_of(self.coefficients) + 1)
+        return max(least, min(4 * math.ceil(rows / 4), _ROWS[1]))
+
+    @cached_property
+    def _atlas(self) -> np.ndarray:
+        """The maps' texels with those around them, as the kernels take them."""
+        maps = self.maps(self._rows)
+        flat = maps.reshape(self._rows * 2 * self._rows, -1)
+        atlas: np.ndarray = np.ascontiguousarray(flat[LatLongMap().ghosts(self._rows, 2 * self._rows).ravel()])
+        return atlas
+
+    def _look_up(self, n: np.ndarray, wo: np.ndarray, eyes: np.ndarray) -> np.ndarray:
+        rows, out = self._rows, np.empty((len(n), self.coefficients.shape[2]), self._atlas.dtype)
+        axis = np.ascontiguousarray(self._axis(n, wo), dtype=np.float64)
+        gain = np.broadcast_to(self._gain(n, wo), len(n)).astype(np.float64)
+        degree = self.exit_degree
+        kernels.look_up(rows, 2 * rows, self._atlas, degree, recursion(degree), axis, eyes, gain, out)
+        return out
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class SHRM:
+    """The reflected light field of a BRDF under an environment, by its lobes.
+
+    `error`: relative rms of pictures of a ball, averaged over views, that the series leave out (`orders.py`); bilinear
+    look-ups in the maps add .005 or so. `made`: how it was made, in words.
+    """
+
+    lobes: tuple[ReflectedLobe, ...]
+    error: float
+    made: str = ""
+
+    def radiance(self, n: Array, wo: Array) -> Array:
+        """B (..., C) at unit world normals n and directions wo to the eye, (..., 3) each, broadcast; one wo is far.
+
+        NumPy arrays are looked up in the maps; those of other libraries take the series itself, which is slower and
+        carries gradients. 0 where the eye is below the surface. A series may fall below 0 where little light is
+        reflected; it is cut there, which only brings it nearer to the truth.
+
+        Raises `DirectionError` where n or wo are not unit, `ArrayError` where they do not broadcast.
+        """
+        require_unit(n, "n")
+        require_unit(wo, "wo")
+        xp, n, wo = floats(n, wo)
+        require_broadcast(n=n, wo=wo)
+        far = wo.ndim == 1 or math.prod(wo.shape[:-1]) == 1
+        eye = xp.reshape(wo, (-1, 3))[:1, :]
+        n, wo = xp.broadcast_arrays(n, wo)
+        shape = n.shape[:-1]
+        n, wo = xp.reshape(n, (-1, 3)), xp.reshape(wo, (-1, 3))
+        total: Any = 0.0
+        for lobe in self.lobes:
+            if is_numpy(n, wo, lobe.coefficients):
+                eyes = np.ascontiguousarray(eye if far else wo, dtype=np.float64)
+                total = total + lobe._look_up(n, wo, eyes)
+            else:
+                total = total + lobe.radiance(n, wo)
+        seen = (dot(n, wo) > 0)[:, None]
+        return xp.reshape(xp.where(seen & (total > 0), total, xp.zeros_like(total)), (*shape, -1))
+
+    def rotated(self, rotation: Array) -> SHRM:
+        """The light turned by `rotation` (3, 3): B'(R n, R wo) = B(n, wo). Raises `DirectionError` if it is none."""
+        return dataclasses.replace(self, lobes=tuple(lobe.rotated(rotation) for lobe in self.lobes))
+
+
+def prefilter(light: Environment, brdf: BRDF, error: float = 0.01) -> SHRM:
+    """The SHRM of an isotropic BRDF, measured ones included, under `light`, with degrees chosen by `error`.
+
+    `error` is the relative rms of pictures of a ball that the series may leave out; `SHRM.error` tells what they do.
+    Warns with `AccuracyWarning` where it is not reached with P = 6 and F = 128, or with the light's own rows: mostly by
+    glossy lobes whose Fresnel reflection is strongest at grazing angles, where lobes change fastest.
+
+    Raises `ParameterError` for an error that is not between 0 and 1, for a BRDF that is not isotropic or whose
+    parameters vary, and for lights that are no environments.
+    """
+    if not 0 < error < 1:
+        raise ParameterError(f"error = {error}; a relative error lies between 0 and 1.")
+    if not isinstance(light, Environment):
+        raise ParameterError(
+            f"{type(light).__name__} is no Environment; add what directional lights reflect by itself."
+        )
+    if not isinstance(light.mapping, LatLongMap):
+        height, _ = light.mapping.sheet_shape(light.rows, light.columns)
+        light = light.resampled(LatLongMap(), max(2 * height, 16))
+    models = brdf.lobes()
+    highest = min(_DEGREES[1], light.rows - 1)
+    degree = min(_DEGREES[0], highest)
+    while True:
+        coefficients = to_numpy(light.harmonics(degree))
+        power = power_spectrum(coefficients.astype(np.float64))
+        seen = [exit_lobes(model, degree, _EXITS) for model in models]
+        energy = sum(float(np.sum(light_field_energy(lobes, power))) for lobes in seen)
+        beyond = [float(np.sum(unseen(lobes, power))) for lobes in seen]
+        # What lobes leave out may add up: each has its part of the error, not of its square.
+        budget = (error / len(models)) ** 2 * energy
+        chosen = [expansion(lobes, power, max(budget - left, 0.0)) for lobes, left in zip(seen, beyond, strict=True)]
+        residual = [float(e.residual.sum()) for e in chosen]
+        # More degrees of the light are of use where they, not those of the exits, are what is missing.
+        if degree == highest or sum(beyond) <= max(0.1 * budget, 0.3 * sum(residual)):
+            break
+        degree = min(2 * degree, highest)
+    left_out = sum(math.sqrt(both) for both in np.add(residual, beyond))
+    reached = left_out / math.sqrt(energy) if energy > 0 else 0.0
+    if reached > error:
+        warnings.warn(
+            f"the series leave out {reached:.2g} of the reflected light, rms, where {error:g} was asked for.",
+            AccuracyWarning,
+            stacklevel=2,
+        )
+    parts = []
+    for e in chosen:
+        c = world_coefficients(coefficients[: (e.degree + 1) ** 2], e.transfer.astype(coefficients.dtype))
+        parts.append(ReflectedLobe(frozen(c, c.dtype), e.about, e.exit_cosine))
+    return SHRM(tuple(parts), reached, f"{type(brdf).__name__}, error {error:g}")
+
+
+@lru_cache(maxsize=8)
+def recursion(degree: int) -> np.ndarray:
+    """a, b and d of `_kernels/expansion.py`, (3, (degree + 1)^2), at index l (l + 1) + m, m >= 0."""
+    factors = np.zeros((3, (degree + 1) ** 2))
+    diagonal = math.sqrt(0.25 / math.pi)
+    for m in range(degree + 1):
+        factors[2, m * (m + 1) + m] = diagonal * (math.sqrt(2) if m else 1)
+        diagonal *= math.sqrt((2 * m + 3) / (2 * m + 2))
+        for l in range(m + 1, degree + 1):
+            at = l * (l + 1) + m
+            factors[0, at] = math.sqrt((4 * l * l - 1) / (l * l - m * m))
+            if l > m + 1:
+                factors[1, at] = math.sqrt((2 * l + 1) * ((l - 1) ** 2 - m * m) / ((2 * l - 3) * (l * l - m * m)))
+    return factors

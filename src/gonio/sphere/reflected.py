@@ -1,0 +1,146 @@
+"""The reflected light field as harmonics of where the surface faces, one set for each harmonic of where the eye is.
+
+    B(n, wo) = sum over p, s of B_ps(n) Y_ps(wo)
+
+With wo in the frame (e_theta, e_phi, n) of the surface, (alpha, beta) the direction of n (RH 5.9, 5.10):
+
+    B_pq(n) = sum over l, m of L_lm rho_lpq D^l_mq(alpha, beta)         a function of spin -q: q turns with the frame
+
+With wo in the world's frame (RH 5.11, 5.14) each B_ps is a plain function, without seam or swirl at the poles, since
+Y_ps(wo in the surface's frame) = sum over s of conj D^p_sq Y_ps(wo), and products of Wigner's functions are sums:
+
+    B_ps(n) = sum over j, M of c_jM Y_jM(n),   c_jM = (-1)^s sum over l of <l M+s p -s | j M> kappa_lpj L_l,M+s
+    kappa_lpj = Lambda_j sum over q of (-1)^q <l q p -q | j 0> rho_lpq             j = l - p, l - p + 2, ..., l + p
+
+so that (P+1)^2 scalar transforms make all maps, and the coefficients are the light field itself. `n` may be any
+direction that the BRDF's coefficients are counted from, as the mirror direction is in `brdf/harmonic.py`.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Array, floats, like
+from ..errors import ArrayError
+from .coupling import clebsch_gordan
+from .grids import Grid
+from .harmonics import complex_from_real, degree_of, degrees_and_orders
+from .transform import synthesis_spin
+from .wigner import big_lambda
+
+
+def world_coefficients(light: Array, transfer: Array) -> Array:
+    """c_jM of every B_ps in real harmonics of both: ((F+P+1)^2, (P+1)^2, C), `index` order in j, M and in p, s.
+
+    light: real coefficients ((F+1)^2, C). transfer: rho_lpq (F+1, P+1, Q+1, C), as in `convolution.py`; either C may
+    be 1. Raises `ArrayError` for shapes that do not fit.
+    """
+    xp, light, transfer = _fitting(light, transfer)
+    degree, exit_degree = degree_of(light), transfer.shape[1] - 1
+    coupling = _coupling(degree, exit_degree, transfer.shape[2] - 1)
+    L = complex_from_real(light)
+    L = xp.concat((L, xp.zeros_like(L[:1, :])), axis=0)
+    # kappa (p, offset, l, C) from rho (l, p, q, C), offset j - l = p - 2 i
+    kappa = xp.sum(
+        like(coupling.kappa, light)[..., None] * xp.permute_dims(transfer, (1, 0, 2, 3))[:, None, ...], axis=3
+    )
+    kappa = xp.reshape(kappa, (-1, kappa.shape[-1]))
+    index = xp.asarray(coupling.kappa_at, device=light.device), xp.asarray(coupling.light_at, device=light.device)
+    weight = like(coupling.weight, light)[..., None]
+    coefficients: Any = 0.0
+    for i in range(exit_degree + 1):
+        part = xp.take(kappa, xp.reshape(index[0][i, ...], (-1,)), axis=0) * xp.reshape(weight[i, ...], (-1, 1))
+        coefficients = coefficients + part * xp.take(L, xp.reshape(index[1][i, ...], (-1,)), axis=0)
+    coefficients = xp.reshape(coefficients, (*coupling.weight.shape[1:], -1))
+    return _real(xp, coefficients, exit_degree)
+
+
+def local_map(light: Array, transfer: Array, grid: Grid, p: int, q: int) -> Array:
+    """B_pq of RH 5.9 on `grid`, q >= 0: complex (rows, columns, C). B_p,-q = (-1)^q conj B_pq.
+
+    Arguments as in `world_coefficients`.
+    """
+    xp, light, transfer = _fitting(light, transfer)
+    degree = degree_of(light)
+    l = degrees_and_orders(degree)[0]
+    scale = like((-1.0) ** q * big_lambda(degree), light)[:, None] * transfer[:, p, q, :]
+    return synthesis_spin(
+        xp.take(scale, xp.asarray(l, device=light.device), axis=0) * complex_from_real(light), grid, -q
+    )
+
+
+def _fitting(light: Array, transfer: Array) -> tuple[Any, Array, Array]:
+    xp, light, transfer = floats(light, transfer)
+    degree = degree_of(light)
+    if light.ndim != 2 or transfer.ndim != 4 or transfer.shape[0] <= degree or transfer.shape[2] > transfer.shape[1]:
+        raise ArrayError(
+            f"light has shape {tuple(light.shape)}, transfer {tuple(transfer.shape)}; expected ((F+1)^2, C) and "
+            "(F+1, P+1, Q+1, C), Q <= P."
+        )
+    return xp, light, transfer[: degree + 1, ...]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class _Coupling:
+    """For each term i of the sum over l (j = l + p - 2 i), each p, s >= 0 and each j, M: where L and kappa stand, and
+    (-1)^s <l M+s p -s | j M>. `kappa` (p, i, l, q): what rho_lpq counts in kappa_lpj."""
+
+    light_at: np.ndarray
+    kappa_at: np.ndarray
+    weight: np.ndarray
+    kappa: np.ndarray
+
+
+@lru_cache(maxsize=8)
+def _coupling(degree: int, exit_degree: int, highest: int) -> _Coupling:
+    l = np.arange(degree + 1)[:, None]
+    q = np.arange(highest + 1)
+    kappa = np.zeros((exit_degree + 1, exit_degree + 1, degree + 1, highest + 1))
+    for p in range(exit_degree + 1):
+        for i in range(p + 1):
+            j = l + p - 2 * i
+            both = np.where(q > 0, 2.0, 1.0) * (-1.0) ** q * clebsch_gordan(l, q, p, -q, j)
+            kappa[p, i] = both * np.sqrt(4 * math.pi / (2 * np.maximum(j, 0) + 1))
+    j, M = degrees_and_orders(degree + exit_degree)
+    sets = [(p, s) for p in range(exit_degree + 1) for s in range(p + 1)]
+    shape = exit_degree + 1, len(sets), j.size
+    light_at, kappa_at = np.full(shape, (degree + 1) ** 2), np.zeros(shape, np.int64)
+    weight = np.zeros(shape)
+    for k, (p, s) in enumerate(sets):
+        for i in range(p + 1):
+            l = j - p + 2 * i
+            m = M + s
+            exists = (l >= 0) & (l <= degree) & (np.abs(m) <= l)
+            light_at[i, k] = np.where(exists, l * (l + 1) + m, (degree + 1) ** 2)
+            kappa_at[i, k] = (p * (exit_degree + 1) + i) * (degree + 1) + np.clip(l, 0, degree)
+            weight[i, k] = (-1.0) ** s * np.where(exists, clebsch_gordan(l, m, p, np.array(-s), j), 0)
+    return _Coupling(light_at, kappa_at, weight, kappa)
+
+
+def _real(xp: Any, coefficients: Array, exit_degree: int) -> Array:
+    """Real coefficients ((J+1)^2, (P+1)^2, C) of complex ones (sets of p, s >= 0, (J+1)^2, C): the real b_ps are
+    (-1)^s sqrt2 Re B_ps and, at -s, -(-1)^s sqrt2 Im B_ps."""
+    degree = math.isqrt(coefficients.shape[1]) - 1
+    j, M = degrees_and_orders(degree)
+    mirror = xp.asarray(j * (j + 1) - M, device=coefficients.device)
+    reflected = xp.conj(xp.take(coefficients, mirror, axis=1)) * like((-1.0) ** M, xp.real(coefficients))[:, None]
+    # Complex coefficients of the real functions 2 Re B and 2 Im B, and from them real ones: at M >= 0 (-1)^M sqrt2
+    # times the real part, at -M minus that times the imaginary part.
+    both, less = coefficients + reflected, coefficients - reflected
+    norm = like(np.where(M == 0, 0.5, math.sqrt(0.5) * (-1.0) ** M), xp.real(coefficients))[:, None]
+    ahead = xp.asarray((M >= 0)[:, None], device=coefficients.device)
+    real = xp.where(ahead, xp.real(both), -xp.take(xp.imag(both), mirror, axis=1)) * norm
+    imaginary = xp.where(ahead, xp.imag(less), xp.take(xp.real(less), mirror, axis=1)) * norm
+    parts: list[Any] = [None] * (exit_degree + 1) ** 2
+    sets = [(p, s) for p in range(exit_degree + 1) for s in range(p + 1)]
+    for k, (p, s) in enumerate(sets):
+        sign = (-1) ** s * math.sqrt(2) if s else 1.0
+        parts[p * (p + 1) + s] = sign * real[k, ...]
+        if s:
+            parts[p * (p + 1) - s] = -sign * imaginary[k, ...]
+    return xp.stack(parts, axis=1)
