@@ -1,4 +1,6 @@
-"""Spherical harmonic reflection maps: what any isotropic BRDF makes of an environment, for all normals and views, RH 5.4.
+"""Spherical harmonic reflection maps: what an isotropic BRDF makes of an environment, for all normals and views.
+
+RH 5.4:
 
     B(n, wo) = sum over lobes of g(theta_o) sum over p, s of b_ps(a) Y_ps(wo),     a = n or the mirror direction of wo
 
@@ -63,10 +65,18 @@ class ReflectedLobe:
     def radiance(self, n: Array, wo: Array) -> Array:
         """B (N, C) at unit normals and directions to the eye (N, 3); arrays of any library, by the series itself."""
         _, n, wo = floats(n, wo)
+        return self.series(n, wo, harmonics(self.exit_degree, wo))
+
+    def series(self, n: Array, wo: Array, eye: Array) -> Array:
+        """The same with `eye` (N, (P+1)^2) in place of the harmonics of wo."""
         c = like(self.coefficients, n) if is_numpy(self.coefficients) else self.coefficients
-        facing = harmonics(degree_of(c), self._axis(n, wo))
+        facing = harmonics(degree_of(c), self.axis(n, wo))
         terms = (facing @ c.reshape(c.shape[0], -1)).reshape(-1, *c.shape[1:])
-        return self._gain(n, wo)[:, None] * (harmonics(self.exit_degree, wo)[:, :, None] * terms).sum(axis=1)
+        return self._gain(n, wo)[:, None] * (eye[:, :, None] * terms).sum(axis=1)
+
+    def axis(self, n: Array, wo: Array) -> Array:
+        """The direction a that it stands about, (N, 3)."""
+        return reflect(wo, n) if self.about is About.MIRROR else n
 
     def maps(self, rows: int) -> np.ndarray:
         """b_ps on a lat-long grid, (rows, 2 rows, (P+1)^2, C)."""
@@ -87,9 +97,6 @@ class ReflectedLobe:
         facing = rotate(c.reshape(c.shape[0], -1), rotation).reshape(c.shape)
         both = rotate(facing.swapaxes(0, 1).reshape(terms, -1), rotation)
         return dataclasses.replace(self, coefficients=both.reshape(terms, c.shape[0], -1).swapaxes(0, 1))
-
-    def _axis(self, n: Array, wo: Array) -> Array:
-        return reflect(wo, n) if self.about is About.MIRROR else n
 
     def _gain(self, n: Array, wo: Array) -> Array:
         xp, cosine = floats(dot(n, wo))
@@ -118,7 +125,7 @@ class ReflectedLobe:
 
     def _look_up(self, n: np.ndarray, wo: np.ndarray, eyes: np.ndarray) -> np.ndarray:
         rows, out = self._rows, np.empty((len(n), self.coefficients.shape[2]), self._atlas.dtype)
-        axis = np.ascontiguousarray(self._axis(n, wo), dtype=np.float64)
+        axis = np.ascontiguousarray(self.axis(n, wo), dtype=np.float64)
         gain = np.broadcast_to(self._gain(n, wo), len(n)).astype(np.float64)
         degree = self.exit_degree
         kernels.look_up(rows, 2 * rows, self._atlas, degree, recursion(degree), axis, eyes, gain, out)
