@@ -5,7 +5,7 @@
     Kautz and McCool 2000         a 3D texture B(a, exit angle), without azimuth: of wo only its angle to a counts
 
 Both are linear in the light field: they put other numbers in the place of Y_ps(wo), sum_k w_k Y_ps(corner_k) and the
-mean over the azimuth about a, P_p(a . wo) Y_ps(a). So each table is made of the lobe's coefficients, and so is its error.
+mean over the azimuth about a, P_p(a . wo) Y_ps(a). So tables and their errors are made of the lobe's coefficients.
 """
 
 from __future__ import annotations
