@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+from reference import coupling as plain
 
 import gonio as gn
+from gonio._kernels import coupling as kernels
 from gonio.sphere.convolution import radiance, reflect
 from gonio.sphere.coupling import clebsch_gordan
 from gonio.sphere.harmonics import complex_from_real, complex_harmonics, harmonics
@@ -110,3 +112,13 @@ def test_products_of_wigner_functions_are_their_sums():
             if abs(m - s) <= j
         )
         close(total, first[l + m, l + q] * second[p - s, p - q])
+
+
+@pytest.mark.parametrize(("first", "second"), [(3, 3), (1, 3), (3, 1)])
+def test_the_kernel_sums_as_its_plain_twin(first, second, rng):
+    light = rng.normal(size=(7, first)) + 1j * rng.normal(size=(7, first))
+    kappa, weight = rng.normal(size=(5, second)), rng.normal(size=(2, 4, 6)) * (rng.random((2, 4, 6)) < 0.7)
+    light_at, kappa_at = rng.integers(7, size=weight.shape), rng.integers(5, size=weight.shape)
+    out = np.empty((4, 6, 3), complex)
+    kernels.couple(light, kappa, light_at, kappa_at, weight, out)
+    close(out, plain.couple(light, kappa, light_at, kappa_at, weight))

@@ -25,7 +25,8 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Array, floats, like
+from .._kernels import coupling as kernels
+from ..arrays import Array, floats, is_numpy, like
 from ..errors import ArrayError
 from .coupling import clebsch_gordan
 from .grids import Grid
@@ -50,12 +51,18 @@ def world_coefficients(light: Array, transfer: Array) -> Array:
         like(coupling.kappa, light)[..., None] * xp.permute_dims(transfer, (1, 0, 2, 3))[:, None, ...], axis=3
     )
     kappa = xp.reshape(kappa, (-1, kappa.shape[-1]))
-    index = xp.asarray(coupling.kappa_at, device=light.device), xp.asarray(coupling.light_at, device=light.device)
+    if is_numpy(L, kappa):
+        channels = max(L.shape[1], kappa.shape[1])
+        coefficients: Any = np.empty((*coupling.weight.shape[1:], channels), L.dtype)
+        weight = coupling.weight.astype(light.dtype)
+        kernels.couple(L, kappa, coupling.light_at, coupling.kappa_at, weight, coefficients)
+        return _real(xp, coefficients, exit_degree)
+    kappa_at, light_at = (xp.asarray(x, device=light.device) for x in (coupling.kappa_at, coupling.light_at))
     weight = like(coupling.weight, light)[..., None]
-    coefficients: Any = 0.0
+    coefficients = 0.0
     for i in range(exit_degree + 1):
-        part = xp.take(kappa, xp.reshape(index[0][i, ...], (-1,)), axis=0) * xp.reshape(weight[i, ...], (-1, 1))
-        coefficients = coefficients + part * xp.take(L, xp.reshape(index[1][i, ...], (-1,)), axis=0)
+        part = xp.take(kappa, xp.reshape(kappa_at[i, ...], (-1,)), axis=0) * xp.reshape(weight[i, ...], (-1, 1))
+        coefficients = coefficients + part * xp.take(L, xp.reshape(light_at[i, ...], (-1,)), axis=0)
     coefficients = xp.reshape(coefficients, (*coupling.weight.shape[1:], -1))
     return _real(xp, coefficients, exit_degree)
 
