@@ -42,6 +42,8 @@ def render(
     size: str = typer.Option("512", "--size", help="Pixels, as 640x480 or 512."),
     samples: int | None = typer.Option(None, "--samples", help="Most beams a ray takes of the light; else as needed."),
     shadows: bool = typer.Option(False, "--shadows", help="Trace shadow rays."),
+    maps_file: Path | None = typer.Option(None, "--maps", help="An SHRM (gonio prefilter --brdf): look-ups, no sums."),
+    compare: bool = typer.Option(False, "--compare", help="Maps, sum over the light, ten times their difference."),
     eye: str = typer.Option("2.6,-3.2,1.6", "--eye", help="The camera's place x,y,z, z up, in radii of the shape."),
     field_of_view: float = typer.Option(34.0, "--fov", help="Vertical field of view in degrees."),
     supersample: int = typer.Option(2, "--supersample", help="Rays a pixel along each side."),
@@ -57,6 +59,7 @@ def render(
     require_writable(output)
     columns, rows = parse.size(size)
     material = parse.reflectance(brdf)
+    arriving = None if maps_file and not light and not sun and not compare else _light(light, layout, orientation, sun)
     scene, centre, radius = _shape(shape, relief, smooth, y_up)
     towards = parse.vector(eye)
     camera = gn.Pinhole.look_at(
@@ -66,20 +69,53 @@ def render(
         size=(rows, columns),
         up=(0, 0, 1) if any(towards[:2]) else (0, 1, 0),  # from straight above, as a map lies
     )
-    with bar("render") as progress:
-        image = gn.render(
-            scene,
-            material,
-            _light(light, layout, orientation, sun),
-            camera,
-            shadows=shadows,
-            samples=samples,
-            supersample=supersample,
-            background=background,
-            progress=progress,
-        )
+    quick = None
+    if maps_file or compare:
+        quick = _by_maps(maps_file, arriving, material, scene, camera, supersample, background)
+    if quick is not None and not compare:
+        image = quick
+    else:
+        assert arriving is not None
+        with bar("render") as progress:
+            image = gn.render(
+                scene,
+                material,
+                arriving,
+                camera,
+                shadows=shadows,
+                samples=samples,
+                supersample=supersample,
+                background=background,
+                progress=progress,
+            )
+        if quick is not None:
+            image = _beside(quick, image)
     write(output, image, exposure, curve)
     typer.echo(str(output))
+
+
+def _by_maps(
+    file: Path | None, light: Light | None, material: Any, scene: Any, camera: Any, supersample: int, background: bool
+) -> Any:
+    """The image by look-ups in the SHRM of `file`, or in one made for the light and material at hand."""
+    import gonio as gn
+    from gonio.errors import ParameterError
+
+    if file is None and not isinstance(light, gn.Environment):
+        raise ParameterError("--compare makes maps of one environment; leave --sun out, or pass --maps.")
+    shrm = gn.read_shrm(file) if file else gn.prefilter(light, material)
+    typer.echo(f"maps: {shrm.made}; they leave out {100 * shrm.error:.2g} % rms", err=True)
+    behind = light if background and isinstance(light, gn.Environment) else None
+    return gn.render_prefiltered(scene, shrm, camera, background=behind, supersample=supersample)
+
+
+def _beside(quick: Any, slow: Any) -> Any:
+    """Both images and ten times their difference, side by side; their relative rms difference is said."""
+    import numpy as np
+
+    rms = float(np.sqrt(np.mean((quick - slow) ** 2) / np.mean(slow**2)))
+    typer.echo(f"rms difference: {100 * rms:.2f} % of the image's rms", err=True)
+    return np.concatenate((quick, slow, 10 * np.abs(quick - slow)), axis=1)
 
 
 def write(output: Path, image: Any, exposure: float, curve: Curve) -> None:

@@ -17,7 +17,7 @@ import numpy as np
 
 from .. import __version__
 from ..brdf.diffuse import Lambert
-from ..brdf.fresnel import Conductor, Fresnel
+from ..brdf.fresnel import Conductor, Fresnel, Schlick
 from ..brdf.microfacet import Microfacet
 from ..brdf.model import BRDF
 from ..brdf.ndf import GGX
@@ -29,9 +29,11 @@ from ..files.images import write_image
 from ..lights.environment import Environment
 from ..lights.model import Beams
 from ..lights.studio import studio
+from ..reflection import radiance
 from ..rendering.image import render
 from ..rendering.irradiance import irradiance
 from ..rendering.prefilter import degree_needed, reflection_map
+from ..rendering.shrm import prefilter
 from ..rendering.tonemap import Filmic, tone_map
 from ..shapes.analytic import Sphere
 from ..shapes.revolution import vase
@@ -67,13 +69,14 @@ def tour(folder: str | Path, progress: Callable[[int, int], None] | None = None)
         raise FileError(f"{folder}: cannot be made ({error.strerror}). Name another folder.") from error
     began = time.perf_counter()
     room = studio(128)
+    stops = (_hero, _materials, _nine_numbers, _reflection_map, _light_field)
     sections = []
-    for done, stop in enumerate((_hero, _materials, _nine_numbers, _reflection_map)):
+    for done, stop in enumerate(stops):
         if progress:
-            progress(done, 4)
+            progress(done, len(stops))
         sections.append(stop(folder, room))
     if progress:
-        progress(4, 4)
+        progress(len(stops), len(stops))
     page = Page(
         title="gonio: light and reflectance",
         lead="Everything below was made on this machine by one command, from data that gonio makes itself: "
@@ -197,6 +200,40 @@ def _reflection_map(folder: Path, room: Environment) -> Section:
                 ),
                 220,
             ),
+        ),
+    )
+
+
+def _light_field(folder: Path, room: Environment) -> Section:
+    material = Lambert([0.08, 0.16, 0.36]) + 0.7 * Microfacet(GGX(0.35), Schlick([0.7, 0.6, 0.5]))
+    maps = prefilter(room, material, 0.05)
+    camera = Orthographic(pixel=2.2 / 200, size=(200, 200), pose=look_at(eye=(2.7, -3.5, 1.2), target=(0, 0, 0)))
+    view = Sphere().view(camera)
+    n, wo, frames = view.normal[view.mask], view.wo[view.mask], view.frames[view.mask]
+    maps.radiance(n[:1], wo[:1])  # the first call compiles
+    found, quick = _timed(lambda: maps.radiance(n, wo))
+    summed, slow = _timed(lambda: radiance(material, room, frames, wo, budget=1024))
+    rms = float(np.sqrt(np.mean((found - summed) ** 2) / np.mean(summed**2)))
+    pictures = []
+    for name, values, caption in (
+        ("field-maps", found, "Looked up in the maps."),
+        ("field-sum", summed, "The sum over 1,024 beams of the room, pixel by pixel."),
+        ("field-error", 10 * np.abs(found - summed), "Their difference, ten times."),
+    ):
+        image = np.zeros((*view.mask.shape, 3))
+        image[view.mask] = values
+        pictures.append(_picture(folder, name, image, caption, 1.0))
+    orders = " and ".join(f"F = {lobe.degree}, P = {lobe.exit_degree}" for lobe in maps.lobes)
+    return Section(
+        "Every normal, every view",
+        (
+            Text(
+                "A spherical harmonic reflection map (RH 5.4) holds what a material makes of the room for all normals "
+                f"and views at once, each of its lobes by itself: {orders}, chosen by the error asked for. Pictures of "
+                f"a ball should miss {100 * maps.error:.1f} % on average over views; this one misses "
+                f"{100 * rms:.1f} %, in {1000 * quick:.0f} ms where the sum took {slow:.1f} s."
+            ),
+            Pictures(pictures, 220),
         ),
     )
 
