@@ -49,6 +49,10 @@ class NegativeWarning(GonioWarning):
     """Radiance or reflectance below zero was found where none can be."""
 
 
+class PhysicsWarning(GonioWarning):
+    """A BRDF reflects more than it receives, or changes when light and eye change places."""
+
+
 class EncodingWarning(GonioWarning):
     """The encoding of a file had to be assumed (an 8-bit photograph taken for sRGB)."""
 

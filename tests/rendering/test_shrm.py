@@ -241,3 +241,42 @@ def test_brdfs_that_are_not_isotropic_are_refused(room):
 def test_lights_that_are_no_environments_are_refused():
     with pytest.raises(gn.GonioError, match="no Environment"):
         prefilter(gn.Directional(np.array([0.0, 0.0, 1.0])), gn.Lambert(0.5))
+
+
+@pytest.mark.filterwarnings("ignore::gonio.errors.AccuracyWarning")
+def test_a_brdf_that_cannot_be_is_told_of(room):
+    # RH 6.2 has 1 / cos theta_o and no shadowing, and its Fresnel term depends on the eye alone.
+    with pytest.warns(gn.GonioWarning) as told:
+        prefilter(room, gn.TorranceSparrow(0.0, 1.0, 1.5, 0.3), error=0.1)
+    words = " ".join(str(one.message) for one in told)
+    assert "times what it receives" in words
+    assert "not reciprocal" in words
+
+
+def test_a_surface_that_reflects_half_as_much_again_is_told_of_and_a_white_one_is_not(room):
+    with pytest.warns(gn.GonioWarning, match="reflects 1.5 times"):
+        prefilter(room, gn.Lambert(0.9) + gn.Lambert(0.6), error=0.1)
+    prefilter(room, gn.Lambert(0.9) + gn.Lambert(0.1), error=0.1)
+
+
+def test_one_channel_serves_as_well(room, ball):
+    n, wo = ball
+    grey = gn.Environment(room.image[..., :1])
+    maps = prefilter(grey, gn.Lambert(0.5), error=0.05)
+    assert maps.radiance(n, wo).shape == (len(n), 1)
+    np.testing.assert_allclose(
+        maps.radiance(n, wo), prefilter(room, gn.Lambert(0.5), error=0.05).radiance(n, wo)[:, :1], rtol=2e-2
+    )
+
+
+def test_cube_maps_are_taken_as_they_are(room, ball):
+    n, wo = ball
+    cube = room.resampled(gn.CubeCross(), 128, gn.Orientation.PANORAMA)
+    found, expected = (prefilter(light, gn.Lambert(0.5), error=0.05).radiance(n, wo) for light in (cube, room))
+    # Resampled twice, each time within 1e-3 of its energy; look-ups add half a per cent.
+    np.testing.assert_allclose(found, expected, atol=0.01 * float(expected.max()))
+
+
+def test_a_black_room_is_reflected_black(ball):
+    n, wo = ball
+    assert not prefilter(gn.Environment(np.zeros((16, 32, 3))), gn.Lambert(0.5), error=0.1).radiance(n, wo).any()

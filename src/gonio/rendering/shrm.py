@@ -23,10 +23,10 @@ import numpy as np
 
 from .._kernels import expansion as kernels
 from ..arrays import Array, floats, frozen, is_numpy, like, require_broadcast, to_numpy
-from ..brdf.harmonic import exit_lobes
+from ..brdf.harmonic import ExitLobes, exit_lobes
 from ..brdf.model import BRDF
-from ..directions import dot, reflect, require_unit
-from ..errors import AccuracyWarning, ParameterError
+from ..directions import dot, from_spherical, reflect, require_unit
+from ..errors import AccuracyWarning, ParameterError, PhysicsWarning
 from ..lights.environment import Environment
 from ..lights.mappings import LatLongMap
 from ..sphere.grids import LatLong
@@ -182,7 +182,8 @@ def prefilter(light: Environment, brdf: BRDF, error: float = 0.01) -> SHRM:
 
     `error` is the relative rms of pictures of a ball that the series may leave out; `SHRM.error` tells what they do.
     Warns with `AccuracyWarning` where it is not reached with P = 6 and F = 128, or with the light's own rows: mostly by
-    glossy lobes whose Fresnel reflection is strongest at grazing angles, where lobes change fastest.
+    glossy lobes whose Fresnel reflection is strongest at grazing angles, where lobes change fastest; with
+    `PhysicsWarning` of a BRDF that reflects more than it receives, or is not reciprocal. It is taken as it is.
 
     Raises `ParameterError` for an error that is not between 0 and 1, for a BRDF that is not isotropic or whose
     parameters vary, and for lights that are no environments.
@@ -213,6 +214,7 @@ def prefilter(light: Environment, brdf: BRDF, error: float = 0.01) -> SHRM:
         if degree == highest or sum(beyond) <= max(0.1 * budget, 0.3 * sum(residual)):
             break
         degree = min(2 * degree, highest)
+    _warn_of(brdf, seen)
     left_out = sum(math.sqrt(both) for both in np.add(residual, beyond))
     reached = left_out / math.sqrt(energy) if energy > 0 else 0.0
     if reached > error:
@@ -226,6 +228,30 @@ def prefilter(light: Environment, brdf: BRDF, error: float = 0.01) -> SHRM:
         c = world_coefficients(coefficients[: (e.degree + 1) ** 2], e.transfer.astype(coefficients.dtype))
         parts.append(ReflectedLobe(frozen(c, c.dtype), e.about, e.exit_cosine))
     return SHRM(tuple(parts), reached, f"{type(brdf).__name__}, error {error:g}")
+
+
+def _warn_of(brdf: BRDF, seen: list[ExitLobes]) -> None:
+    """Warn of a BRDF that cannot be, from its lobes about the normal and from a few pairs of directions."""
+    # rho_00(theta_o) is the albedo there times sqrt(2 pi) Y_00.
+    albedo = math.sqrt(2) * sum(lobes.coefficients[0, :, 0] for lobes in seen)
+    worst = np.unravel_index(int(np.argmax(albedo)), albedo.shape)
+    if albedo[worst] > 1.02:
+        angle = math.degrees(math.acos(seen[0].cosine[worst[0]]))
+        warnings.warn(
+            f"{type(brdf).__name__} reflects {albedo[worst]:.3g} times what it receives, seen {angle:.0f} degrees off "
+            "the normal.",
+            PhysicsWarning,
+            stacklevel=3,
+        )
+    theta, phi = np.meshgrid((0.2, 0.6, 1.0, 1.3), (0.0, 1.0, 2.5), indexing="ij")
+    wi, wo = from_spherical(theta, phi).reshape(-1, 3), from_spherical(theta.T, phi.T + 0.7).reshape(-1, 3)
+    one, other = to_numpy(brdf.f(wi, wo)), to_numpy(brdf.f(wo, wi))
+    if not np.allclose(one, other, rtol=0.05, atol=1e-3 * float(np.max(one))):
+        warnings.warn(
+            f"{type(brdf).__name__} is not reciprocal: f changes when light and eye change places.",
+            PhysicsWarning,
+            stacklevel=3,
+        )
 
 
 @lru_cache(maxsize=8)
