@@ -337,3 +337,10 @@ def test_tensors_are_answered_in_kind_and_carry_gradients(rng, directions):
 def test_bad_environments_are_refused(make, error, says):
     with pytest.raises(error, match=says):
         make()
+
+
+def test_the_mean_of_a_large_map_is_summed_in_double_precision():
+    room = gn.studio(512)
+    image = room.image.astype(np.float64) * room.solid_angles[..., None]
+    np.testing.assert_allclose(room.mean_radiance, image.sum(axis=(0, 1)) / (4 * np.pi), rtol=1e-6)
+    assert room.mean_radiance.dtype == room.image.dtype

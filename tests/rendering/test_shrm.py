@@ -11,7 +11,7 @@ import gonio as gn
 from gonio.brdf.harmonic import exit_lobes, mirror_transfer, transfer
 from gonio.brdf.model import BRDF
 from gonio.rendering.orders import About, fitted
-from gonio.rendering.shrm import ReflectedLobe, prefilter, recursion
+from gonio.rendering.shrm import ReflectedLobe, prefilter
 from gonio.sphere.harmonics import harmonics, power_spectrum
 from gonio.sphere.reflected import world_coefficients
 
@@ -203,16 +203,6 @@ def test_one_far_eye_and_the_same_eye_everywhere_see_the_same(room, ball):
     wo = gn.normalise(np.array([1.0, 2.0, 0.5]))
     maps = prefilter(room, gn.OrenNayar(0.6, 0.5), error=0.05)
     np.testing.assert_allclose(maps.radiance(n, wo), maps.radiance(n, np.broadcast_to(wo, n.shape)), rtol=1e-5)
-
-
-def test_the_kernels_harmonics_are_the_harmonics(rng):
-    from gonio._kernels import expansion as kernels
-
-    w = gn.normalise(rng.normal(size=(20, 3)))
-    out = np.empty((20, 49))
-    for k in range(20):
-        kernels.harmonics(6, recursion(6), *w[k], out[k])
-    np.testing.assert_allclose(out, harmonics(6, w), atol=1e-13)
 
 
 def test_tensors_take_the_series_and_keep_their_gradients(room, ball):

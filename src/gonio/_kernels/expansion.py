@@ -1,8 +1,9 @@
-"""Look-ups in maps of harmonics: at each direction of a lat-long map a series in real harmonics of where the eye is.
+"""Look-ups in maps of harmonics: at each direction of a lat-long grid a series in real harmonics of where the eye is.
 
-    out[k] = gain[k] sum over t of Y_t(eye[k]) map_t(w[k]),      map_t bilinear between texel centres
+    out[k] = gain[k] sum over t of Y_t(eye[k]) map_t(w[k])
 
-The atlas is that of `environment.py`, (h + 2) (w + 2) texels of T C numbers, harmonic by harmonic. The harmonics are
+The maps are sums of cubic B-splines, a sheet as in `splines.py` with T C numbers for each place, harmonic by harmonic.
+The harmonics are
 
     Y_l,+-m = Q_lm (cos, sin)(m phi) sin^m theta,     Q_lm = a_lm z Q_l-1,m - b_lm Q_l-2,m,     Q_mm = d_m
 
@@ -15,11 +16,15 @@ import numpy as np
 from numba import njit
 
 from .environment import in_latlong
+from .splines import GHOSTS, splines
 
 _BLOCK = 256
 
+# Sums may be reordered and fused so that they vectorise; NaN and infinity still spread as they should.
+_FAST = {"contract", "nsz", "reassoc"}
 
-@njit(cache=True, nogil=True, fastmath={"contract", "nsz"}, error_model="numpy")
+
+@njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
 def harmonics(degree, factors, x, y, z, out):  # type: ignore[no-untyped-def]
     """Y_lm of the unit direction (x, y, z), ((degree + 1)^2,)."""
     c, s = 1.0, 0.0  # Re and Im of (x + i y)^m
@@ -35,36 +40,27 @@ def harmonics(degree, factors, x, y, z, out):  # type: ignore[no-untyped-def]
         c, s = x * c - y * s, x * s + y * c
 
 
-@njit(cache=True, nogil=True, fastmath={"contract", "nsz", "reassoc"}, error_model="numpy")
-def _blend(texels, at, stride, f, g, eye, out):  # type: ignore[no-untyped-def]
-    """Add the series `eye` (T,) of the four texels around to out (C,)."""
-    channels = out.size
-    for q in range(2):
-        for r in range(2):
-            share = (f if q else 1 - f) * (g if r else 1 - g)
-            row = texels[at + q * stride + r]
-            if channels == 3:
-                a, b, c = 0.0, 0.0, 0.0
-                for t in range(eye.size):
-                    a += eye[t] * row[3 * t]
-                    b += eye[t] * row[3 * t + 1]
-                    c += eye[t] * row[3 * t + 2]
-                out[0] += share * a
-                out[1] += share * b
-                out[2] += share * c
-            else:
-                for t in range(eye.size):
-                    for k in range(channels):
-                        out[k] += share * eye[t] * row[channels * t + k]
+@njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
+def _gather(sheet, y, x, terms):  # type: ignore[no-untyped-def]
+    """terms (T C,): the maps at row y and column x of the sheet."""
+    i, j = int(y), int(x)
+    rows, columns = splines(y - i), splines(x - j)
+    terms[:] = 0
+    for q in range(4):
+        for r in range(4):
+            low = (j - 1 + r) * terms.size
+            near, share = sheet[i - 1 + q, low : low + terms.size], sheet.dtype.type(rows[q] * columns[r])
+            for k in range(terms.size):
+                terms[k] += share * near[k]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def look_up(height, width, texels, degree, factors, w, eyes, gain, out):  # type: ignore[no-untyped-def]
+def look_up(sheet, border, columns, degree, factors, w, eyes, gain, out):  # type: ignore[no-untyped-def]
     """Fill `out` (n, C) at unit directions w (n, 3), for unit eyes (n, 3), or (1, 3) for a far one; gain (n,)."""
     u, v = np.empty(_BLOCK), np.empty(_BLOCK)
     x, y, z = np.empty(_BLOCK), np.empty(_BLOCK), np.empty(_BLOCK)
-    eye, total = np.empty((degree + 1) ** 2), np.empty(out.shape[1])
-    stride = width + 2
+    count, channels, rows = (degree + 1) ** 2, out.shape[1], sheet.shape[0] - 2 * border
+    eye, terms = np.empty(count), np.empty(count * channels, sheet.dtype)
     if eyes.shape[0] == 1:
         harmonics(degree, factors, eyes[0, 0], eyes[0, 1], eyes[0, 2], eye)
     for start in range(0, w.shape[0], _BLOCK):
@@ -75,9 +71,9 @@ def look_up(height, width, texels, degree, factors, w, eyes, gain, out):  # type
         for k in range(n):
             if eyes.shape[0] > 1:
                 harmonics(degree, factors, eyes[start + k, 0], eyes[start + k, 1], eyes[start + k, 2], eye)
-            row, column = v[k] * height + 0.5, u[k] * width + 0.5
-            i, j = min(max(int(row), 0), height), min(max(int(column), 0), width)
-            total[:] = 0
-            _blend(texels, i * stride + j, stride, row - i, column - j, eye, total)
-            for c in range(out.shape[1]):
-                out[start + k, c] = gain[start + k] * total[c]
+            _gather(sheet, v[k] * rows + (border - 0.5), u[k] * columns + (GHOSTS - 0.5), terms)
+            for c in range(channels):
+                total = 0.0
+                for t in range(count):
+                    total += eye[t] * terms[t * channels + c]
+                out[start + k, c] = gain[start + k] * total

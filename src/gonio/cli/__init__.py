@@ -13,7 +13,7 @@ from typing import Any
 import typer
 
 from ..errors import GonioError
-from . import convert, demo, info, render
+from . import convert, demo, info, prefilter, render, sh
 
 Usage: Any = typer.BadParameter.__base__  # click's error for whatever is mistyped, which typer does not name
 
@@ -41,8 +41,9 @@ def gonio(
     """From photographs of a known shape to reflectance and light that you can render."""
 
 
-for verb in (info.info, convert.convert, render.render, demo.demo):
+for verb in (info.info, convert.convert, render.render, prefilter.prefilter, demo.demo):
     app.command(no_args_is_help=verb is not demo.demo)(verb)
+app.add_typer(sh.app, name="sh")
 
 
 def main(arguments: list[str] | None = None) -> None:

@@ -101,11 +101,15 @@ def _by_maps(
     import gonio as gn
     from gonio.errors import ParameterError
 
-    if file is None and not isinstance(light, gn.Environment):
+    room = light if isinstance(light, gn.Environment) else None
+    if file:
+        shrm = gn.read_shrm(file)
+    elif room:
+        shrm = gn.prefilter(room, material)
+    else:
         raise ParameterError("--compare makes maps of one environment; leave --sun out, or pass --maps.")
-    shrm = gn.read_shrm(file) if file else gn.prefilter(light, material)
     typer.echo(f"maps: {shrm.made}; they leave out {100 * shrm.error:.2g} % rms", err=True)
-    behind = light if background and isinstance(light, gn.Environment) else None
+    behind = room if background else None
     return gn.render_prefiltered(scene, shrm, camera, background=behind, supersample=supersample)
 
 

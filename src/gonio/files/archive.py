@@ -15,6 +15,7 @@ import math
 import os
 import zipfile
 import zlib
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -25,7 +26,7 @@ from .whole import writing
 
 _MANIFEST = "gonio.json"
 _LONGEST_MANIFEST = 1 << 20
-_DAMAGE = (zipfile.BadZipFile, zlib.error, EOFError, OSError, ValueError, KeyError, NotImplementedError, RuntimeError)
+_DAMAGE = (zipfile.BadZipFile, zlib.error, EOFError, OSError, ValueError, KeyError, RuntimeError)
 
 
 def write_archive(
@@ -48,7 +49,7 @@ def read_archive(
 
     Raises `FileError` where the file is none, of another kind, newer, damaged, or its arrays exceed `memory_limit`.
     """
-    require_file(path)
+    require_file(Path(path))
     try:
         with zipfile.ZipFile(path) as archive:
             entries = {entry.filename: entry for entry in archive.infolist()}

@@ -112,8 +112,11 @@ class Environment(Light):
     @property
     def mean_radiance(self) -> Array:
         """Radiance averaged over all directions that the picture shows, (C,)."""
-        weights = like(self.solid_angles / self.solid_angles.sum(), self.image)
-        return namespace(self.image).sum(self.image * weights[..., None], axis=(0, 1))
+        xp = namespace(self.image)
+        # In double precision: millions of pixels, of which a lamp may outshine the rest a thousandfold.
+        image = xp.astype(self.image, xp.float64)
+        weights = like(self.solid_angles / self.solid_angles.sum(), image)
+        return xp.astype(xp.sum(image * weights[..., None], axis=(0, 1)), self.image.dtype)
 
     def radiance(self, w: Array) -> Array:
         """Radiance (..., C) arriving from the unit world directions `w` (..., 3), bilinear between pixel centres.

@@ -7,7 +7,7 @@
 The last is Sloan's aim (2017, Deringing Spherical Harmonics), the weakest window that makes a series non-negative,
 taken among all windows: a convex problem with a condition for every n, of which the worst are found one after the
 other. For the irradiance of a lamp at degree 2 it leaves an error of 5.6 % rms where the two families above, once
-narrow enough, leave over 20 %: they damp l = 2 much more than l = 1, and it is l = 1 that pulls the far side below zero.
+narrow enough, leave over 20 %: they damp l = 2 much more than l = 1, which is what pulls the far side below zero.
 
 The minimum over the sphere, of which this lives, is exact to degree 2, where the series is the quadratic [n; 1]^T M
 [n; 1] of RH 4.14 and Lagrange's multiplier the root of a secular equation. Above, triangles on the sphere are halved

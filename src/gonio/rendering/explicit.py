@@ -59,7 +59,8 @@ def cabral_weights(wo: np.ndarray) -> np.ndarray:
 
 def cabral_radiance(lobe: ReflectedLobe, n: np.ndarray, wo: np.ndarray) -> np.ndarray:
     """What the twelve maps give at unit normals and directions to the eye (N, 3): (N, C)."""
-    return lobe.series(n, wo, cabral_weights(wo) @ harmonics(lobe.exit_degree, icosahedron()[0]))
+    field: np.ndarray = lobe.series(n, wo, cabral_weights(wo) @ harmonics(lobe.exit_degree, icosahedron()[0]))
+    return field
 
 
 def kautz_mccool_texture(lobe: ReflectedLobe, rows: int, exits: int) -> tuple[np.ndarray, np.ndarray]:
@@ -88,7 +89,8 @@ def kautz_mccool_radiance(lobe: ReflectedLobe, n: np.ndarray, wo: np.ndarray) ->
     a = lobe.axis(n, wo)
     zonal = _zonal(lobe.exit_degree, np.sum(a * wo, axis=1))
     degree = np.repeat(np.arange(lobe.exit_degree + 1), 2 * np.arange(lobe.exit_degree + 1) + 1)
-    return lobe.series(n, wo, zonal[:, degree] * harmonics(lobe.exit_degree, a))
+    field: np.ndarray = lobe.series(n, wo, zonal[:, degree] * harmonics(lobe.exit_degree, a))
+    return field
 
 
 def _zonal(degree: int, cosine: np.ndarray) -> np.ndarray:

@@ -29,6 +29,7 @@ from ..directions import dot, from_spherical, reflect, require_unit
 from ..errors import AccuracyWarning, ParameterError, PhysicsWarning
 from ..lights.environment import Environment
 from ..lights.mappings import LatLongMap
+from ..sphere import splines
 from ..sphere.grids import LatLong
 from ..sphere.harmonics import degree_of, degrees_and_orders, harmonics, power_spectrum
 from ..sphere.reflected import world_coefficients
@@ -37,7 +38,6 @@ from ..sphere.transform import synthesis
 from .orders import GRAZING, About, expansion, light_field_energy, unseen
 
 _DEGREES = 32, 128  # harmonics of the light at first, and at most
-_ROWS = 16, 512
 _EXITS = 48  # angles at which a BRDF is looked at
 
 
@@ -104,31 +104,28 @@ class ReflectedLobe:
 
     @cached_property
     def _rows(self) -> int:
-        """Rows between which bilinear look-ups miss .5 % rms of what the maps hold.
-
-        Halfway between samples d apart a wave of degree j is short by (j d)^2 / 8 of its height, .0913 (j d)^2 rms.
-        """
-        j = degrees_and_orders(degree_of(self.coefficients))[0]
-        energy = (to_numpy(self.coefficients) ** 2).sum(axis=(1, 2))
-        curvature = math.sqrt(float(np.sum((j * (j + 1.0)) ** 2 * energy) / max(float(np.sum(energy)), 1e-300)))
-        rows = math.pi * math.sqrt(0.0913 * curvature / 0.005)
-        least = max(_ROWS[0], degree_of(self.coefficients) + 1)
-        return max(least, min(4 * math.ceil(rows / 4), _ROWS[1]))
+        """Rows between whose splines look-ups miss .2 % rms of what the maps hold, or as many as carry them."""
+        degree = degree_of(self.coefficients)
+        j = degrees_and_orders(degree)[0]
+        energy = (to_numpy(self.coefficients).astype(np.float64) ** 2).sum(axis=(1, 2))
+        rows = 4 * (degree // 4 + 2)
+        while np.sum(energy * splines.relative_error(j, rows) ** 2) > 0.002**2 * np.sum(energy):
+            rows += 4
+        return rows
 
     @cached_property
-    def _atlas(self) -> np.ndarray:
-        """The maps' texels with those around them, as the kernels take them."""
-        maps = self.maps(self._rows)
-        flat = maps.reshape(self._rows * 2 * self._rows, -1)
-        atlas: np.ndarray = np.ascontiguousarray(flat[LatLongMap().ghosts(self._rows, 2 * self._rows).ravel()])
-        return atlas
+    def _sheet(self) -> np.ndarray:
+        """The maps as splines."""
+        c = to_numpy(self.coefficients)
+        return splines.sheet(c.reshape(c.shape[0], -1), self._rows)
 
     def _look_up(self, n: np.ndarray, wo: np.ndarray, eyes: np.ndarray) -> np.ndarray:
-        rows, out = self._rows, np.empty((len(n), self.coefficients.shape[2]), self._atlas.dtype)
+        out = np.empty((len(n), self.coefficients.shape[2]), self._sheet.dtype)
         axis = np.ascontiguousarray(self.axis(n, wo), dtype=np.float64)
         gain = np.broadcast_to(self._gain(n, wo), len(n)).astype(np.float64)
         degree = self.exit_degree
-        kernels.look_up(rows, 2 * rows, self._atlas, degree, recursion(degree), axis, eyes, gain, out)
+        where = self._sheet, splines.BORDER, 2 * self._rows
+        kernels.look_up(*where, degree, recursion(degree), axis, eyes, gain, out)
         return out
 
 
@@ -136,8 +133,8 @@ class ReflectedLobe:
 class SHRM:
     """The reflected light field of a BRDF under an environment, by its lobes.
 
-    `error`: relative rms of pictures of a ball, averaged over views, that the series leave out (`orders.py`); bilinear
-    look-ups in the maps add .005 or so. `made`: how it was made, in words.
+    `error`: relative rms of pictures of a ball, averaged over views, that the series leave out (`orders.py`); look-ups
+    add .002. `made`: how it was made, in words.
     """
 
     lobes: tuple[ReflectedLobe, ...]
@@ -233,7 +230,7 @@ def prefilter(light: Environment, brdf: BRDF, error: float = 0.01) -> SHRM:
 def _warn_of(brdf: BRDF, seen: list[ExitLobes]) -> None:
     """Warn of a BRDF that cannot be, from its lobes about the normal and from a few pairs of directions."""
     # rho_00(theta_o) is the albedo there times sqrt(2 pi) Y_00.
-    albedo = math.sqrt(2) * sum(lobes.coefficients[0, :, 0] for lobes in seen)
+    albedo = math.sqrt(2) * np.sum([np.broadcast_to(x.coefficients[0, :, 0], (_EXITS, 3)) for x in seen], axis=0)
     worst = np.unravel_index(int(np.argmax(albedo)), albedo.shape)
     if albedo[worst] > 1.02:
         angle = math.degrees(math.acos(seen[0].cosine[worst[0]]))
