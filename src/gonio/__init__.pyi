@@ -47,6 +47,11 @@ from .files.images import read_image as read_image
 from .files.images import read_layers as read_layers
 from .files.images import write_image as write_image
 from .files.images import write_layers as write_layers
+from .files.ktx2 import read_chain as read_chain
+from .files.ktx2 import read_ktx2 as read_ktx2
+from .files.ktx2 import write_chain as write_chain
+from .files.ktx2 import write_ktx2 as write_ktx2
+from .files.ktx2 import write_split_sum as write_split_sum
 from .files.merl import read_merl as read_merl
 from .files.merl import write_merl as write_merl
 from .files.meshes import read_mesh as read_mesh
@@ -75,9 +80,12 @@ from .lights.studio import studio as studio
 from .reflection import radiance as radiance
 from .rendering.basis_images import basis_images as basis_images
 from .rendering.basis_images import relit as relit
+from .rendering.chain import RoughnessChain as RoughnessChain
+from .rendering.chain import roughness_chain as roughness_chain
 from .rendering.deringing import dering as dering
 from .rendering.explicit import cabral_maps as cabral_maps
 from .rendering.explicit import kautz_mccool_texture as kautz_mccool_texture
+from .rendering.fibres import prefilter_fibres as prefilter_fibres
 from .rendering.image import render as render
 from .rendering.irradiance import irradiance as irradiance
 from .rendering.irradiance import irradiance_coefficients as irradiance_coefficients
@@ -88,6 +96,7 @@ from .rendering.prefilter import reflection_map as reflection_map
 from .rendering.prefiltered import render_prefiltered as render_prefiltered
 from .rendering.shrm import SHRM as SHRM
 from .rendering.shrm import prefilter as prefilter
+from .rendering.split_sum import split_sum as split_sum
 from .rendering.tonemap import Filmic as Filmic
 from .rendering.tonemap import Reinhard as Reinhard
 from .rendering.tonemap import tone_map as tone_map

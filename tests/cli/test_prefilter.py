@@ -85,3 +85,32 @@ def test_what_cannot_be_done_is_one_line_and_exit_2(capsys, tmp_path, monkeypatc
     assert (code, out) == (2, "")
     assert says in err.splitlines()[-1]
     assert [path.name for path in tmp_path.iterdir()] == ["sky.exr"]
+
+
+def test_a_material_makes_maps_for_all_views(capsys, tmp_path, sky):
+    output = tmp_path / "maps.gonio"
+    code, out, _ = run(capsys, sky, "-o", output, "--brdf", "lambert:albedo=.5", "--error", 0.05, "--json")
+    facts = json.loads(out)
+    assert code == 0
+    assert facts["error"] <= 0.05
+    assert [lobe["about"] for lobe in facts["lobes"]] == ["normal"]
+    maps = gn.read_shrm(output)
+    assert "lambert:albedo=.5" in maps.made
+    # Matte, under 1 + z: albedo (1 + 2/3 n.z), of which splines and the fit leave half a per cent.
+    n = gn.normalise(np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 0.6, -0.8]]))
+    np.testing.assert_allclose(maps.radiance(n, n)[:, 0], 0.5 * (1 + 2 / 3 * n[:, 2]), atol=0.005)
+
+
+@pytest.mark.parametrize(
+    ("name", "arguments", "message"),
+    [
+        ("maps.exr", ("--brdf", "lambert"), "written as .gonio"),
+        ("maps.gonio", (), "--brdf"),
+        ("maps.gonio", ("--brdf", "ward:ks=.3,alpha_x=.1,alpha_y=.4"), "has no"),
+    ],
+)
+def test_maps_that_cannot_be_are_refused_in_one_line(capsys, tmp_path, sky, name, arguments, message):
+    code, _, err = run(capsys, sky, "-o", tmp_path / name, *arguments)
+    assert code == 2
+    assert message in err.splitlines()[-1]
+    assert not (tmp_path / name).exists()

@@ -1,4 +1,4 @@
-"""`gonio prefilter`: an environment map blurred for every roughness, as real-time engines read it."""
+"""`gonio prefilter`: an environment map blurred beforehand: for every roughness, or for one material and all views."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from ..errors import FileError
-from . import maps
+from . import maps, parse
 
 if TYPE_CHECKING:
     from ..rendering.lobes import Lobe
@@ -34,7 +34,10 @@ class Name(enum.StrEnum):
 def prefilter(
     source: list[Path] = typer.Argument(..., help="An environment map (or its two or six parts)."),
     output: Path = typer.Option(
-        ..., "--output", "-o", help="chain.ktx2; or six faces a level: a folder, or a name such as m{level}_{face}.exr."
+        ..., "--output", "-o", help="chain.ktx2; or six faces a level: a folder, or m{level}_{face}.exr; or maps.gonio."
+    ),
+    brdf: list[str] = typer.Option(
+        [], "--brdf", help="For maps.gonio: an SHRM of this material, written as for render. Repeat to add."
     ),
     size: int = typer.Option(256, "--size", min=1, help="Texels along a face of the sharpest level."),
     levels: int | None = typer.Option(None, "--levels", min=1, help="Levels; else down to faces of 8 texels."),
@@ -48,7 +51,10 @@ def prefilter(
     to_orientation: str = typer.Option("", "--to-orientation", help="The tool that will read the faces."),
     as_json: bool = typer.Option(False, "--json", help="One JSON object a level, a line each."),
 ) -> None:
-    """Blur an environment map for every roughness: cube maps with mip levels, for real-time engines."""
+    """Blur an environment map for every roughness, for real-time engines; or for one material and all views."""
+    if brdf or output.suffix.lower() == ".gonio":
+        _shrm(source, output, brdf, error, layout, orientation, as_json)
+        return
     from ..files.ktx2 import require_chain_writable, write_chain, write_split_sum
     from ..files.whole import writable
     from ..rendering.chain import roughness_chain
@@ -75,3 +81,38 @@ def prefilter(
             typer.echo(json.dumps({"level": k, **facts}))
         else:
             typer.echo(f"{k:5} {texels:6} {roughness:10.3f} {alpha:7.4f} {degree:7} {off:.1e}")
+
+
+def _shrm(
+    source: list[Path],
+    output: Path,
+    brdf: list[str],
+    error: float,
+    layout: maps.Layout | None,
+    orientation: str,
+    as_json: bool,
+) -> None:
+    """An SHRM, RH 5.4, as a .gonio."""
+    import dataclasses
+
+    import gonio as gn
+    from gonio.files.whole import writable
+
+    if output.suffix.lower() != ".gonio":
+        raise FileError(f"{output}: maps of a material are written as .gonio.")
+    if not brdf:
+        raise FileError(f"{output}: maps of a material want one: --brdf, as for gonio render.")
+    writable(output)
+    material = parse.reflectance(brdf)
+    environment = maps.read(source, layout, orientation)
+    typer.echo(f"{source[0]}: {maps.stands(environment)}", err=True)
+    shrm = gn.prefilter(environment, material, error)
+    made = f"gonio prefilter {source[0]} " + " ".join(f"--brdf {term}" for term in brdf) + f" --error {error:g}"
+    gn.write_shrm(output, dataclasses.replace(shrm, made=f"{made} (gonio {gn.__version__})"))
+    lobes = [{"about": lobe.about.value, "F": lobe.degree, "P": lobe.exit_degree} for lobe in shrm.lobes]
+    if as_json:
+        typer.echo(json.dumps({"error": shrm.error, "lobes": lobes}))
+    else:
+        for lobe in lobes:
+            typer.echo(f"about the {lobe['about']} direction: F = {lobe['F']}, P = {lobe['P']}")
+        typer.echo(f"error {shrm.error:.2g}, rms of pictures of a ball")
