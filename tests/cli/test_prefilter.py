@@ -39,6 +39,10 @@ def test_a_chain_in_one_file_and_a_line_a_level(capsys, tmp_path, sky, lobe):
     assert all(f["error"] <= 0.01 for f in facts)
     chain = read_chain(output)
     assert chain.lobe == lobe
+    with pytest.raises(SystemExit):
+        main(["info", str(output), "--json"])
+    said = json.loads(capsys.readouterr().out)
+    assert (said["columns"], said["faces"], said["levels"], said["gonio:lobe"]) == (16, 6, 3, lobe)
     # A matte surface under 1 + z: E / pi = 1 + 2/3 n.z (RH 3.32); half floats and an error of 1e-2.
     z = chain.environment(2).directions()[0][..., 2]
     np.testing.assert_allclose(chain.faces[2].reshape(24, 4, 3)[..., 0], 1 + 2 / 3 * z, atol=0.01)
@@ -96,6 +100,9 @@ def test_a_material_makes_maps_for_all_views(capsys, tmp_path, sky):
     assert [lobe["about"] for lobe in facts["lobes"]] == ["normal"]
     maps = gn.read_shrm(output)
     assert "lambert:albedo=.5" in maps.made
+    with pytest.raises(SystemExit):
+        main(["info", str(output), "--json"])
+    assert json.loads(capsys.readouterr().out)["lobe 0"].startswith("about the normal direction")
     # Matte, under 1 + z: albedo (1 + 2/3 n.z), of which splines and the fit leave half a per cent.
     n = gn.normalise(np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 0.6, -0.8]]))
     np.testing.assert_allclose(maps.radiance(n, n)[:, 0], 0.5 * (1 + 2 / 3 * n[:, 2]), atol=0.005)

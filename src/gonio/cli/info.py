@@ -13,10 +13,11 @@ IMAGES = (".exr", ".hdr", ".pic", ".pfm", ".png", ".tif", ".tiff", ".jpg", ".jpe
 RAW = (".dng", ".cr2", ".cr3", ".nef", ".arw", ".raf", ".orf", ".rw2")
 BRDFS = (".binary", ".bsdf", ".brdf")
 MESHES = (".obj", ".ply", ".stl", ".off")
+MAPS = (".gonio", ".ktx2")
 
 
 def info(
-    files: list[Path] = typer.Argument(..., help="Images, environment maps, BRDF files, meshes."),
+    files: list[Path] = typer.Argument(..., help="Images, environment maps, BRDF files, meshes, prefiltered maps."),
     as_json: bool = typer.Option(False, "--json", help="One JSON object a file, a line each."),
     picture: Path | None = typer.Option(None, "--picture", help="A PNG to look at: an image, or the lobes of BRDFs."),
 ) -> None:
@@ -45,7 +46,9 @@ def describe(path: Path) -> dict[str, Any]:
         return _brdf(path)
     if suffix in MESHES:
         return _mesh(path)
-    known = " ".join(IMAGES + BRDFS + MESHES)
+    if suffix in MAPS:
+        return _shrm(path) if suffix == ".gonio" else _texture(path)
+    known = " ".join(IMAGES + BRDFS + MESHES + MAPS)
     raise FileError(f"{path}: not a kind of file that gonio knows ({known}, and camera raw).")
 
 
@@ -145,6 +148,37 @@ def _mesh(path: Path) -> dict[str, Any]:
         "texture coordinates": mesh.uv is not None,
         "low": low.tolist(),
         "high": high.tolist(),
+    }
+
+
+def _shrm(path: Path) -> dict[str, Any]:
+    import gonio as gn
+
+    shrm = gn.read_shrm(path)
+    return {
+        "kind": "SHRM",
+        "made": shrm.made,
+        "error": shrm.error,
+        **{
+            f"lobe {k}": f"about the {lobe.about.value} direction, F = {lobe.degree}, P = {lobe.exit_degree}"
+            for k, lobe in enumerate(shrm.lobes)
+        },
+    }
+
+
+def _texture(path: Path) -> dict[str, Any]:
+    import gonio as gn
+
+    texture = gn.read_ktx2(path)
+    first = texture.levels[0]
+    return {
+        "kind": "texture",
+        "format": "KTX 2.0",
+        "columns": first.shape[-2],
+        "rows": first.shape[-3],
+        "faces": 6 if first.ndim == 4 else 1,
+        "levels": len(texture.levels),
+        **texture.text,
     }
 
 

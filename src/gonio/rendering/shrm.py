@@ -243,7 +243,8 @@ def _warn_of(brdf: BRDF, seen: list[ExitLobes]) -> None:
     theta, phi = np.meshgrid((0.2, 0.6, 1.0, 1.3), (0.0, 1.0, 2.5), indexing="ij")
     wi, wo = from_spherical(theta, phi).reshape(-1, 3), from_spherical(theta.T, phi.T + 0.7).reshape(-1, 3)
     one, other = to_numpy(brdf.f(wi, wo)), to_numpy(brdf.f(wo, wi))
-    if not np.allclose(one, other, rtol=0.05, atol=1e-3 * float(np.max(one))):
+    # Measured materials are some per cent off.
+    if not np.allclose(one, other, rtol=0.2, atol=1e-3 * float(np.max(one))):
         warnings.warn(
             f"{type(brdf).__name__} is not reciprocal: f changes when light and eye change places.",
             PhysicsWarning,
