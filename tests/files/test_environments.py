@@ -4,6 +4,7 @@ import pytest
 
 import gonio as gn
 from gonio.errors import FileError, ParameterError
+from gonio.files import environments
 from gonio.files.images import write_images
 from gonio.frames import euler
 
@@ -211,3 +212,15 @@ def test_openexr_s_maps_agree_to_a_tenth_with_their_pixels_on_the_edges(data):
     x, y, z = np.sin(longitude) * np.cos(latitude), np.sin(latitude), np.cos(longitude) * np.cos(latitude)
     off = (cube.radiance(np.stack((x, -z, y), -1)) - flat.image)[64:-64]
     assert np.sqrt((off**2).mean()) < 0.03
+
+
+@pytest.mark.parametrize("side", [1, 9, 16])
+def test_cubes_in_another_order_of_faces_keep_every_texel(side, rng):
+    cube = gn.Environment(rng.random((6 * side, side, 3)), gn.CubeStrip(), gn.Orientation.OPENGL)
+    for mapping, orientation in (
+        (gn.CubeStrip.openexr(), gn.Orientation.OPENEXR),
+        (gn.CubeCross(vertical=True), gn.Orientation.PANORAMA),
+    ):
+        picture = environments.as_picture(cube, mapping, orientation)
+        kept = np.sort(picture.image[picture.solid_angles > 0], axis=None)
+        np.testing.assert_array_equal(kept, np.sort(cube.image, axis=None))

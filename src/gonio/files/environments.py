@@ -159,6 +159,9 @@ def _rows(environment: Environment, mapping: Mapping) -> int:
     if type(mapping) is type(environment.mapping) and mapping == environment.mapping:
         return environment.rows
     unit = mapping.shape(12)
+    if mapping.sheets == environment.mapping.sheets == 6:
+        side, _ = environment.mapping.sheet_shape(environment.rows, environment.columns)
+        return 12 * side // mapping.sheet_shape(*unit)[0]
     coarse = float(mapping.solid_angles(*unit).max())
     wanted = 12 * (coarse / float(environment.solid_angles.max())) ** 0.5
     return 12 * max(int(wanted / 12 + 0.5), 1)
