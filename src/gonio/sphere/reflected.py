@@ -14,6 +14,11 @@ Y_ps(wo in the surface's frame) = sum over s of conj D^p_sq Y_ps(wo), and produc
 
 so that (P+1)^2 scalar transforms make all maps, and the coefficients are the light field itself. `n` may be any
 direction that the BRDF's coefficients are counted from, as the mirror direction is in `brdf/harmonic.py`.
+
+A BRDF that is not isotropic sees a tangent too, turned by gamma from e_theta (RH 2.43); one map of spin -k for each
+order k of the light in the surface's frame, and no transform over rotations:
+
+    B_pq(n, gamma) = sum over k of e^{i k gamma} sum over l, m of L_lm rho_lk,pq D^l_mk(alpha, beta)
 """
 
 from __future__ import annotations
@@ -79,6 +84,36 @@ def local_map(light: Array, transfer: Array, grid: Grid, p: int, q: int) -> Arra
     return synthesis_spin(
         xp.take(scale, xp.asarray(l, device=light.device), axis=0) * complex_from_real(light), grid, -q
     )
+
+
+def anisotropic_map(light: Array, transfer: Array, grid: Grid, gamma: Array) -> Array:
+    """B_pq of RH 2.43 on `grid`, for a field of tangents: complex (rows, columns, (P+1)^2, C), `index` order in p, q.
+
+    light: real coefficients ((F+1)^2, C). transfer: rho_lk,pq ((F+1)^2, (P+1)^2, C), complex, of
+    `brdf.harmonic.anisotropic_transfer`. gamma (rows, columns), radians, from e_theta towards e_phi to the tangent. The
+    exit directions are local, in the frame of the tangent. Raises `ArrayError` for shapes that do not fit.
+    """
+    xp, gamma = floats(gamma)
+    _, light = floats(light)
+    degree = degree_of(light)
+    shapes = tuple(light.shape), tuple(transfer.shape), tuple(gamma.shape)
+    if light.ndim != 2 or transfer.ndim != 3 or transfer.shape[0] < light.shape[0] or shapes[2] != grid.shape:
+        raise ArrayError(
+            f"light, transfer and gamma have shapes {shapes[0]}, {shapes[1]} and {shapes[2]}; expected ((F+1)^2, C), "
+            f"((F+1)^2, (P+1)^2, C) and {grid.shape}."
+        )
+    l, _ = degrees_and_orders(degree)
+    L = complex_from_real(light)[:, None, :]
+    total: Any = 0.0
+    for k in range(-degree, degree + 1):
+        # rho_lk of every l, m; there is none where l < k.
+        place = xp.asarray(np.clip(l * (l + 1) + k, 0, light.shape[0] - 1), device=light.device)
+        scale = like(np.where(l >= abs(k), (-1.0) ** k * big_lambda(degree)[l], 0), light)[:, None, None]
+        c = scale * xp.take(transfer, place, axis=0) * L
+        maps = synthesis_spin(xp.reshape(c, (c.shape[0], -1)), grid, -k)
+        turn = xp.cos(k * gamma) + 1j * xp.sin(k * gamma)
+        total = total + turn[..., None, None] * xp.reshape(maps, (*grid.shape, *c.shape[1:]))
+    return total
 
 
 def _fitting(light: Array, transfer: Array) -> tuple[Any, Array, Array]:
