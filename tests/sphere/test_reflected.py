@@ -148,7 +148,7 @@ def test_anisotropic_maps_are_the_reflected_light_field(rng):
 def test_brushed_metal_along_a_field_of_tangents_is_the_integral_over_the_light(rng):
     from gonio.brdf.harmonic import anisotropic_transfer
 
-    brdf, degree, exit_degree = gn.Ward(0.5, 0.35, 0.8), 12, 12
+    brdf, degree, exit_degree = gn.Ward(0.5, 0.35, 0.8), 6, 12
     grid = gn.LatLong(26, 52)
     light = np.asarray(gn.studio(64).harmonics(degree), float)
     gamma = np.broadcast_to(0.8 * grid.phi, grid.shape)
@@ -160,12 +160,14 @@ def test_brushed_metal_along_a_field_of_tangents_is_the_integral_over_the_light(
     )
     local = gn.normalise(np.array([0.3, -0.2, 0.9]))
     eye = complex_harmonics(exit_degree, local)
+    found, exact = [], []
     for r, c in ((3, 5), (12, 20), (20, 41)):
         frame = gn.euler(grid.theta[r], grid.phi[c], gamma[r, c]).T
         f = brdf.f(w @ frame.T, local) * np.maximum(w @ frame[2], 0)[:, None]
-        exact = (f * E).sum(axis=0)
-        # Exits below the surface are black, an edge that degree 12 rings about: 5 % well above it.
-        np.testing.assert_allclose(np.real(eye @ maps[r, c]), exact, rtol=0.08)
+        found.append(np.real(eye @ maps[r, c]))
+        exact.append((f * E).sum(axis=0))
+    # Exits below the surface are black, an edge about which degree 12 rings by some per cent of what is brightest.
+    np.testing.assert_allclose(found, exact, atol=0.02 * np.max(exact))
 
 
 def test_tangents_that_do_not_fit_the_grid_are_refused():
