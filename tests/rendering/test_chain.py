@@ -2,10 +2,8 @@
 
 import numpy as np
 import pytest
-from reference import cube_sums as plain
 
 import gonio as gn
-from gonio._kernels import cube_sums as kernels
 from gonio.errors import NegativeWarning
 from gonio.rendering import chain as module
 from gonio.rendering.chain import roughness_chain
@@ -127,19 +125,6 @@ def test_brightness_does_not_depend_on_size(room, rng):
     coarse, fine = (roughness_chain(room, size, (0.4,)).environment(0).radiance(w) for size in (32, 64))
     # Bilinear between texels 1/16 apart, of a lobe .4 wide.
     np.testing.assert_allclose(coarse, fine, rtol=0.01)
-
-
-@pytest.mark.parametrize("channels", [1, 3])
-def test_means_over_texels_are_sums_over_parts_of_pixels(channels, rng):
-    size = 3
-    image, weights = rng.random((8, 16, channels), dtype=np.float32), rng.random(16)
-    fine = gn.LatLong(16, 32)
-    polar, around = (np.stack((np.cos(x), np.sin(x)), axis=-1).astype(np.float32) for x in (fine.theta, fine.phi))
-    turn = gn.euler(0.3, 0.4, 0.5)
-    sums = np.zeros((6 * size * size, channels + 1))
-    kernels.add(image, around, polar, weights, turn.astype(np.float32), size, sums)
-    expected = plain.cube_sums(image, fine.directions() @ turn.T, weights, size)
-    np.testing.assert_allclose(sums, expected, atol=1e-6)
 
 
 @pytest.mark.parametrize("size", [16, 64])
