@@ -92,8 +92,8 @@ from .rendering.irradiance import irradiance_coefficients as irradiance_coeffici
 from .rendering.irradiance import irradiance_error as irradiance_error
 from .rendering.irradiance import irradiance_map as irradiance_map
 from .rendering.irradiance import irradiance_matrix as irradiance_matrix
-from .rendering.prefilter import reflection_map as reflection_map
 from .rendering.prefiltered import render_prefiltered as render_prefiltered
+from .rendering.reflection_map import reflection_map as reflection_map
 from .rendering.shrm import SHRM as SHRM
 from .rendering.shrm import prefilter as prefilter
 from .rendering.split_sum import split_sum as split_sum

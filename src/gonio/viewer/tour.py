@@ -32,7 +32,7 @@ from ..lights.studio import studio
 from ..reflection import radiance
 from ..rendering.image import render
 from ..rendering.irradiance import irradiance
-from ..rendering.prefilter import degree_needed, reflection_map
+from ..rendering.reflection_map import degree_needed, reflection_map
 from ..rendering.shrm import prefilter
 from ..rendering.tonemap import Filmic, tone_map
 from ..shapes.analytic import Sphere

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import gonio as gn
-from gonio.rendering.prefilter import degree_needed
+from gonio.rendering.reflection_map import degree_needed
 from gonio.sphere import zonal
 
 

@@ -3,7 +3,7 @@
     B(R) = sum_lm A_l L_lm Y_lm(R)         A_l of the lobe, from `sphere.zonal`
 
 One map then serves every surface point and view: look it up at R = reflect(wo, n). Exact for lobes that depend on the
-angle to R alone (Phong, RH 3.36). Lobes that change with the view need the maps of RH 5.4, which are not here.
+angle to R alone (Phong, RH 3.36). Lobes that change with the view need the maps of RH 5.4: `shrm.py`.
 """
 
 from __future__ import annotations
