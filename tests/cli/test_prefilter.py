@@ -121,3 +121,27 @@ def test_maps_that_cannot_be_are_refused_in_one_line(capsys, tmp_path, sky, name
     assert code == 2
     assert message in err.splitlines()[-1]
     assert not (tmp_path / name).exists()
+
+
+@pytest.mark.parametrize("name", ["chain.ktx2", "maps.gonio"])
+def test_a_picture_comes_with_the_maps(capsys, tmp_path, sky, name):
+    picture = tmp_path / "look.png"
+    what = ("--size", 16, "--levels", 2) if name.endswith("ktx2") else ("--brdf", "lambert:albedo=.5", "--error", 0.1)
+    code, _, _ = run(capsys, sky, "-o", tmp_path / name, *what, "--picture", picture)
+    image = gn.read_image(picture)
+    assert code == 0
+    # Two levels of six faces of 96 pixels; five balls of 200.
+    assert image.shape == ((192, 576, 3) if name.endswith("ktx2") else (200, 1000, 3))
+    # Light is 1 + z: what looks up is brightest, what looks down darkest.
+    if name.endswith("ktx2"):
+        up, down = image[:96, 192:288].mean(), image[:96, 288:384].mean()
+        assert up > 2 * down
+    else:
+        assert image[40, 100].mean() > image[160, 100].mean()
+
+
+def test_a_picture_that_is_no_png_is_refused_first(capsys, tmp_path, sky):
+    code, _, err = run(capsys, sky, "-o", tmp_path / "chain.ktx2", "--picture", tmp_path / "look.jpg")
+    assert code == 2
+    assert "PNG" in err
+    assert not (tmp_path / "chain.ktx2").exists()

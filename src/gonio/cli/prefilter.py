@@ -5,7 +5,7 @@ from __future__ import annotations
 import enum
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import typer
 
@@ -44,6 +44,7 @@ def prefilter(
     lobe: Name = typer.Option(Name.GGX, "--lobe", help="What blurs the light."),
     error: float = typer.Option(0.01, "--error", help="Greatest rms error of a level, relative."),
     table: Path | None = typer.Option(None, "--table", help="Also the split-sum table of GGX: .ktx2 or .exr."),
+    picture: Path | None = typer.Option(None, "--picture", help="A PNG to look at: all levels, or balls in the light."),
     layout: maps.Layout | None = typer.Option(
         None, "--layout", help="The map's layout, where its shape does not tell."
     ),
@@ -52,8 +53,10 @@ def prefilter(
     as_json: bool = typer.Option(False, "--json", help="One JSON object a level, a line each."),
 ) -> None:
     """Blur an environment map for every roughness, for real-time engines; or for one material and all views."""
+    if picture and picture.suffix.lower() != ".png":
+        raise FileError(f"{picture}: the picture is a PNG; end its name in .png.")
     if brdf or output.suffix.lower() == ".gonio":
-        _shrm(source, output, brdf, error, layout, orientation, as_json)
+        _shrm(source, output, brdf, error, picture, layout, orientation, as_json)
         return
     from ..files.ktx2 import require_chain_writable, write_chain, write_split_sum
     from ..files.whole import writable
@@ -72,6 +75,8 @@ def prefilter(
     write_chain(output, chain, reader)
     if table:
         write_split_sum(table, split_sum(_TABLE))
+    if picture:
+        _show(picture, chain.picture())
     rows = zip(chain.sizes, chain.roughness, chain.alphas, chain.degrees, chain.errors, strict=True)
     if not as_json:
         typer.echo("level   size  roughness   alpha  degree  error")
@@ -88,6 +93,7 @@ def _shrm(
     output: Path,
     brdf: list[str],
     error: float,
+    picture: Path | None,
     layout: maps.Layout | None,
     orientation: str,
     as_json: bool,
@@ -109,6 +115,10 @@ def _shrm(
     shrm = gn.prefilter(environment, material, error)
     made = f"gonio prefilter {source[0]} " + " ".join(f"--brdf {term}" for term in brdf) + f" --error {error:g}"
     gn.write_shrm(output, dataclasses.replace(shrm, made=f"{made} (gonio {gn.__version__})"))
+    if picture:
+        from gonio.rendering.prefiltered import balls
+
+        _show(picture, balls(shrm, environment))
     lobes = [{"about": lobe.about.value, "F": lobe.degree, "P": lobe.exit_degree} for lobe in shrm.lobes]
     if as_json:
         typer.echo(json.dumps({"error": shrm.error, "lobes": lobes}))
@@ -116,3 +126,12 @@ def _shrm(
         for lobe in lobes:
             typer.echo(f"about the {lobe['about']} direction: F = {lobe['F']}, P = {lobe['P']}")
         typer.echo(f"error {shrm.error:.2g}, rms of pictures of a ball")
+
+
+def _show(path: Path, image: Any) -> None:
+    """Write an image exposed for its own brightness."""
+    import numpy as np
+
+    import gonio as gn
+
+    gn.write_image(path, gn.tone_map(np.broadcast_to(image, (*image.shape[:2], 3)), exposure=None))

@@ -80,6 +80,15 @@ class RoughnessChain:
         faces = self.faces[level]
         return Environment(faces.reshape(-1, *faces.shape[2:]), CubeStrip(), Orientation.OPENGL)
 
+    def picture(self, side: int = 96) -> np.ndarray:
+        """All levels to look at, sharp ones on top, six faces of `side` pixels beside each other: (levels side, 6 side,
+        C)."""
+        rows = []
+        for faces in self.faces:
+            at = np.minimum((np.arange(side) + 0.5) * faces.shape[1] / side, faces.shape[1] - 1).astype(np.intp)
+            rows.append(np.concatenate(list(faces[:, at][:, :, at]), axis=1))
+        return np.concatenate(rows)
+
 
 class _Plan(NamedTuple):
     """A level's A_l, its error so far, and the rows of the grid that its series is summed on."""

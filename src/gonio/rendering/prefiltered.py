@@ -12,10 +12,12 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 
 from ..arrays import to_numpy
-from ..cameras import Camera
+from ..cameras import Camera, Pinhole
+from ..directions import normalise
 from ..errors import MEMORY_LIMIT, MemoryLimitError, ParameterError
 from ..lights.environment import Environment
 from ..reflection import processors
+from ..shapes.analytic import Sphere
 from ..shapes.view import Shape
 from .shrm import SHRM
 
@@ -66,3 +68,13 @@ def render_prefiltered(
         for _ in pool.map(band, range(0, rows, step)):
             pass
     return image
+
+
+def balls(maps: SHRM, background: Environment | None = None, size: int = 200) -> np.ndarray:
+    """A ball seen from four sides and from above, to look at: (size, 5 size, 3)."""
+    eyes = ((0.0, -1.0, 0.3), (1.0, 0.0, 0.3), (0.0, 1.0, 0.3), (-1.0, 0.0, 0.3), (0.0, -0.3, 1.0))
+    images = []
+    for eye in eyes:
+        camera = Pinhole.look_at(eye=5 * normalise(eye), target=(0, 0, 0), field_of_view=27, size=(size, size))
+        images.append(render_prefiltered(Sphere(), maps, camera, background=background, supersample=2))
+    return np.concatenate(images, axis=1)
