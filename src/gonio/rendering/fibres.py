@@ -1,10 +1,11 @@
 """Fibres under an environment: Kajiya and Kay's model by its tangent (RH 5.3.1, 5.7.1).
 
     B(t, wo) = integral over the whole sphere of f(theta_i, theta_o) L(w) d omega,     angles counted from the tangent t
+             = sum over p of b_p(t) Y_p0(theta_o),     b_p = sum over l, m of Lambda_l rho_lp0 L_lm Y_lm(t)
 
-A fibre has no normal: light reaches it from all around, and azimuth about it does not count, so that only q = 0 is
-there (P + 1 terms about the tangent, though (P + 1)^2 in the world's frame). f is Kajiya and Kay's, without a surface's
-cosine. Counted from the tangent it is not about the mirror cone, and P is large: 8 for 97 % of the energy at s = 32.
+A fibre has no normal: light reaches it from all around, and azimuth about it does not count, so that P + 1 maps hold
+it. f is Kajiya and Kay's, without a surface's cosine. Counted from the tangent it is not about the mirror cone, and P
+is large: 8 for 97 % of the energy at s = 32.
 """
 
 from __future__ import annotations
@@ -15,35 +16,45 @@ import warnings
 
 import numpy as np
 
-from ..arrays import Array, floats, frozen, to_numpy
+from ..arrays import Array, floats, frozen, is_numpy, like, to_numpy
 from ..brdf.harmonic import meridian
 from ..brdf.kajiya_kay import KajiyaKay
-from ..directions import require_unit
+from ..directions import dot, require_unit
 from ..errors import AccuracyWarning, ParameterError
 from ..lights.environment import Environment
 from ..lights.mappings import LatLongMap
-from ..sphere.harmonics import power_spectrum
-from ..sphere.reflected import world_coefficients
+from ..sphere.harmonics import degree_of, degrees_and_orders, harmonics, power_spectrum
 from ..sphere.wigner import big_lambda
-from .orders import About
-from .shrm import ReflectedLobe
 
 _DEGREE = 24  # the most, of light and of exits
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class FibreMaps:
-    """What fibres of every direction reflect towards every eye. `error`: relative rms that the series leave out."""
+    """What fibres of every direction reflect towards every eye.
 
-    lobe: ReflectedLobe
+    coefficients: b_p in real harmonics of t, ((F+1)^2, P+1, C). error: relative rms that the series leave out.
+    """
+
+    coefficients: Array
     error: float
 
     def radiance(self, t: Array, wo: Array) -> Array:
-        """B (N, C) of fibres along unit tangents t (N, 3), seen from unit wo (N, 3), by the series; cut at 0."""
+        """B (N, C) of fibres along unit tangents t (N, 3), seen from unit wo (N, 3), by the series; cut at 0.
+
+        Raises `DirectionError` where t or wo are not unit.
+        """
         require_unit(t, "t")
         require_unit(wo, "wo")
         xp, t, wo = floats(t, wo)
-        B = self.lobe.radiance(t, wo)
+        c = like(self.coefficients, t) if is_numpy(self.coefficients) else self.coefficients
+        terms = (harmonics(degree_of(c), t) @ xp.reshape(c, (c.shape[0], -1))).reshape(-1, *c.shape[1:])
+        cosine = xp.clip(dot(t, wo), -1.0, 1.0)
+        around = xp.stack((xp.sqrt(1 - cosine * cosine), xp.zeros_like(cosine), cosine), axis=-1)
+        around = around / xp.sqrt(dot(around, around))[..., None]
+        p = np.arange(c.shape[1])
+        zonal = xp.take(harmonics(c.shape[1] - 1, around), xp.asarray(p * (p + 1), device=t.device), axis=-1)
+        B = xp.sum(zonal[..., None] * terms, axis=1)
         return xp.where(B > 0, B, xp.zeros_like(B))
 
 
@@ -93,5 +104,6 @@ def prefilter_fibres(light: Environment, model: KajiyaKay, error: float = 0.03) 
             AccuracyWarning,
             stacklevel=2,
         )
-    c = world_coefficients(coefficients[: (F + 1) ** 2], rho[: F + 1, : P + 1].astype(coefficients.dtype))
-    return FibreMaps(ReflectedLobe(frozen(c, c.dtype), About.NORMAL, False), left)
+    l = degrees_and_orders(F)[0]
+    c = coefficients[: (F + 1) ** 2, None] * (big_lambda(F)[:, None, None] * rho[: F + 1, : P + 1, 0])[l]
+    return FibreMaps(frozen(c, coefficients.dtype), left)
