@@ -20,11 +20,11 @@ from ..arrays import Array, floats, frozen, is_numpy, like, to_numpy
 from ..brdf.harmonic import meridian
 from ..brdf.kajiya_kay import KajiyaKay
 from ..directions import dot, require_unit
-from ..errors import AccuracyWarning, ParameterError
+from ..errors import AccuracyWarning
 from ..lights.environment import Environment
-from ..lights.mappings import LatLongMap
 from ..sphere.harmonics import degree_of, degrees_and_orders, harmonics, power_spectrum
 from ..sphere.wigner import big_lambda
+from .orders import on_grid, require_share
 
 _DEGREE = 24  # the most, of light and of exits
 
@@ -77,13 +77,8 @@ def prefilter_fibres(light: Environment, model: KajiyaKay, error: float = 0.03) 
     Warns with `AccuracyWarning` where degree 24 does not reach it. Raises `ParameterError` for an error that is not
     between 0 and 1, and for lights that are no environments.
     """
-    if not 0 < error < 1:
-        raise ParameterError(f"error = {error}; a relative error lies between 0 and 1.")
-    if not isinstance(light, Environment):
-        raise ParameterError(f"{type(light).__name__} is no Environment.")
-    if not isinstance(light.mapping, LatLongMap):
-        height, _ = light.mapping.sheet_shape(light.rows, light.columns)
-        light = light.resampled(LatLongMap(), max(2 * height, 16))
+    require_share(error)
+    light = on_grid(light)
     degree = min(_DEGREE, light.rows - 1)
     coefficients = to_numpy(light.harmonics(degree))
     rho, energy = fibre_transfer(model, degree, _DEGREE)

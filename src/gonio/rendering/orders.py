@@ -21,10 +21,31 @@ import math
 import numpy as np
 
 from ..brdf.harmonic import ExitLobes, meridian
+from ..errors import ParameterError
+from ..lights.environment import Environment
+from ..lights.mappings import LatLongMap
 from ..sphere.wigner import big_lambda
 
 HIGHEST_EXIT_DEGREE = 6
 GRAZING = 0.1  # the least cos theta_o that B is divided by
+
+
+def require_share(error: float) -> None:
+    """Raises `ParameterError` where a relative error is not between 0 and 1."""
+    if not 0 < error < 1:
+        raise ParameterError(f"error = {error}; a relative error lies between 0 and 1.")
+
+
+def on_grid(light: Environment) -> Environment:
+    """The light as a lat-long map, whose harmonics are quick. Raises `ParameterError` where it is no environment."""
+    if not isinstance(light, Environment):
+        raise ParameterError(
+            f"{type(light).__name__} is no Environment; add what directional lights reflect by itself."
+        )
+    if isinstance(light.mapping, LatLongMap):
+        return light
+    height, _ = light.mapping.sheet_shape(light.rows, light.columns)
+    return light.resampled(LatLongMap(), max(2 * height, 16))
 
 
 class About(enum.Enum):
@@ -38,13 +59,12 @@ class About(enum.Enum):
 class Expansion:
     """rho_lpq (F+1, P+1, P+1, C) about a direction; `exit_cosine`: of B cos theta_o rather than of B.
 
-    energy: (C,) of the light field; residual: (C,), the part of it that is left out.
+    residual: (C,), the energy of the light field that is left out.
     """
 
     about: About
     exit_cosine: bool
     transfer: np.ndarray
-    energy: np.ndarray
     residual: np.ndarray
 
     @property
@@ -77,9 +97,8 @@ def expansion(lobes: ExitLobes, power: np.ndarray, budget: float) -> Expansion:
 def fitted(lobes: ExitLobes, about: About, exit_cosine: bool, exit_degree: int, power: np.ndarray) -> Expansion:
     """rho_lpq to `exit_degree` that fit `lobes`, which are counted from `about`, best; with all their degrees l."""
     degrees, exits, _, channels = lobes.coefficients.shape
-    gain = 1 / np.maximum(lobes.cosine, GRAZING) if exit_cosine else np.ones(exits)
     root = np.sqrt(lobes.weight)
-    basis = meridian(exit_degree, lobes.angle) * (math.sqrt(2 * math.pi) * gain * root)[:, None, None]
+    basis = _basis(lobes, exit_degree, exit_cosine) * root[:, None, None]
     transfer = np.zeros((degrees, exit_degree + 1, exit_degree + 1, channels))
     carried = np.zeros((degrees, channels))
     for q in range(min(exit_degree, degrees - 1) + 1):
@@ -88,23 +107,27 @@ def fitted(lobes: ExitLobes, about: About, exit_cosine: bool, exit_degree: int, 
         projected = orthonormal.T @ target
         transfer[:, q:, q] = np.linalg.solve(triangle, projected).reshape(-1, degrees, channels).swapaxes(0, 1)
         carried += (2 if q else 1) * np.sum(projected**2, axis=0).reshape(degrees, channels)
-    scale = _scale(degrees - 1, power)
-    energy = np.sum(scale * _energy(lobes), axis=0)
-    return Expansion(about, exit_cosine, transfer, energy, np.maximum(energy - np.sum(scale * carried, axis=0), 0))
+    left = light_field_energy(lobes, power) - np.sum(_scale(degrees - 1, power) * carried, axis=0)
+    return Expansion(about, exit_cosine, transfer, np.maximum(left, 0))
 
 
 def _cut(whole: Expansion, lobes: ExitLobes, power: np.ndarray, budget: float) -> Expansion:
     """The same with the fewest degrees l that keep to `budget`."""
     # The fit is a projection: a degree carries as much energy as goes with it.
-    basis = meridian(whole.exit_degree, lobes.angle) * math.sqrt(2 * math.pi)
+    basis = _basis(lobes, whole.exit_degree, whole.exit_cosine)
     values = np.einsum("lpqc,kpq->lkqc", whole.transfer, basis, optimize=True)
-    if whole.exit_cosine:
-        values = values / np.maximum(lobes.cosine, GRAZING)[:, None, None]
     carried = _scale(whole.degree, power) * _energy(dataclasses.replace(lobes, coefficients=values))
     beyond = np.cumsum(carried[::-1], axis=0)[::-1]
     left = whole.residual + np.concatenate((beyond[1:], np.zeros_like(beyond[:1])))
     degree = int(np.argmax(left.sum(axis=1) <= budget))
     return dataclasses.replace(whole, transfer=whole.transfer[: degree + 1], residual=left[degree])
+
+
+def _basis(lobes: ExitLobes, exit_degree: int, exit_cosine: bool) -> np.ndarray:
+    """What each rho_lpq adds to rho_lq at the exits, (K, P+1, P+1)."""
+    gain = 1 / np.maximum(lobes.cosine, GRAZING) if exit_cosine else np.ones_like(lobes.cosine)
+    basis: np.ndarray = meridian(exit_degree, lobes.angle) * (math.sqrt(2 * math.pi) * gain)[:, None, None]
+    return basis
 
 
 def _energy(lobes: ExitLobes) -> np.ndarray:

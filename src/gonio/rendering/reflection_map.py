@@ -17,12 +17,12 @@ from ..lights.mappings import LatLongMap
 from ..sphere.grids import LatLong
 from ..sphere.transform import synthesis
 from ..sphere.zonal import convolve
+from .orders import require_share
 
 
 def degree_needed(A: Array, error: float) -> int:
     """The least degree beyond which abs(A_l) stays below `error` times A_0: where the series of a lobe may end."""
-    if not 0 < error < 1:
-        raise ParameterError(f"error = {error}; a relative error lies between 0 and 1.")
+    require_share(error)
     _, A = floats(A)
     kept = [l for l in range(A.shape[0]) if abs(float(A[l])) >= error * abs(float(A[0]))]
     return max(kept, default=0)

@@ -26,16 +26,15 @@ from ..arrays import Array, floats, frozen, is_numpy, like, require_broadcast, t
 from ..brdf.harmonic import ExitLobes, exit_lobes
 from ..brdf.model import BRDF
 from ..directions import dot, from_spherical, reflect, require_unit
-from ..errors import AccuracyWarning, ParameterError, PhysicsWarning
+from ..errors import AccuracyWarning, PhysicsWarning
 from ..lights.environment import Environment
-from ..lights.mappings import LatLongMap
 from ..sphere import splines
 from ..sphere.grids import LatLong
 from ..sphere.harmonics import degree_of, degrees_and_orders, harmonics, power_spectrum
 from ..sphere.reflected import world_coefficients
 from ..sphere.rotation import rotate
 from ..sphere.transform import synthesis
-from .orders import GRAZING, About, expansion, light_field_energy, unseen
+from .orders import GRAZING, About, expansion, light_field_energy, on_grid, require_share, unseen
 
 _DEGREES = 32, 128  # harmonics of the light at first, and at most
 _EXITS = 48  # angles at which a BRDF is looked at
@@ -185,15 +184,8 @@ def prefilter(light: Environment, brdf: BRDF, error: float = 0.01) -> SHRM:
     Raises `ParameterError` for an error that is not between 0 and 1, for a BRDF that is not isotropic or whose
     parameters vary, and for lights that are no environments.
     """
-    if not 0 < error < 1:
-        raise ParameterError(f"error = {error}; a relative error lies between 0 and 1.")
-    if not isinstance(light, Environment):
-        raise ParameterError(
-            f"{type(light).__name__} is no Environment; add what directional lights reflect by itself."
-        )
-    if not isinstance(light.mapping, LatLongMap):
-        height, _ = light.mapping.sheet_shape(light.rows, light.columns)
-        light = light.resampled(LatLongMap(), max(2 * height, 16))
+    require_share(error)
+    light = on_grid(light)
     models = brdf.lobes()
     highest = min(_DEGREES[1], light.rows - 1)
     degree = min(_DEGREES[0], highest)
