@@ -17,7 +17,7 @@ from .grids import Grid
 from .legendre import folded_recursion, odd_factors
 from .packing import root_two
 from .quadrature import mend
-from .tiles import empty_tiles
+from .tiles import scratch_tiles
 
 _PIECE = 2**19  # bytes of rings that the sums over theta take at once
 
@@ -42,7 +42,7 @@ def synthesise(coefficients: np.ndarray, grid: Grid, degree: int) -> np.ndarray:
     recursion = folded_recursion(grid, degree)
     factors = odd_factors(degree, recursion.a.shape[1])
     norms = _norms(degree, dtype)
-    tiles = empty_tiles(degree + 1, 4 * channels, recursion.t.size, dtype)
+    tiles = scratch_tiles(degree + 1, 4 * channels, recursion.t.size, dtype)
     for orders in _orders(tiles):
         packed = np.empty((orders.stop - orders.start, recursion.a.shape[1], 4 * channels), dtype)
         kernels.pack(coefficients, degree, *factors, norms, orders.start, packed)

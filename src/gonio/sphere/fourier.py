@@ -13,7 +13,7 @@ import numpy as np
 
 from .._kernels import fourier as kernels
 from .grids import Grid
-from .tiles import LANES, empty_tiles
+from .tiles import LANES, scratch_tiles
 
 _LINE = 64  # bytes
 
@@ -28,7 +28,7 @@ class Transforms:
         """Tiles of values (rows, columns, C), times `weights` (2, pairs); the equator counts twice."""
         channels = values.shape[2]
         image = np.ascontiguousarray(values).reshape(self.grid.rows, -1)
-        tiles = empty_tiles(self.degree + 1, 4 * channels, weights.shape[1], values.dtype)
+        tiles = scratch_tiles(self.degree + 1, 4 * channels, weights.shape[1], values.dtype)
         plan = _plan(self.degree, self.grid.columns, channels, values.dtype)
         kernels.analyse(image, _lanes(weights, channels), *plan, _by_parts(tiles))
         return tiles

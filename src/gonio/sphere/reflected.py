@@ -48,23 +48,23 @@ def world_coefficients(light: Array, transfer: Array) -> Array:
     """
     xp, light, transfer = _fitting(light, transfer)
     degree, exit_degree = degree_of(light), transfer.shape[1] - 1
-    coupling = _coupling(degree, exit_degree, transfer.shape[2] - 1)
+    coupling = _coupling(degree, exit_degree, transfer.shape[2] - 1, str(light.dtype) if is_numpy(light) else "float64")
     L = complex_from_real(light)
-    L = xp.concat((L, xp.zeros_like(L[:1, :])), axis=0)
-    # kappa (p, offset, l, C) from rho (l, p, q, C), offset j - l = p - 2 i
+    # kappa (p, i, l, C) from rho (l, p, q, C), j = l + p - 2 i
     kappa = xp.sum(
         like(coupling.kappa, light)[..., None] * xp.permute_dims(transfer, (1, 0, 2, 3))[:, None, ...], axis=3
     )
-    kappa = xp.reshape(kappa, (-1, kappa.shape[-1]))
     if is_numpy(L, kappa):
-        channels = max(L.shape[1], kappa.shape[1])
-        coefficients: Any = np.empty((*coupling.weight.shape[1:], channels), L.dtype)
-        weight = coupling.weight.astype(light.dtype)
-        kernels.couple(L, kappa, coupling.light_at, coupling.kappa_at, weight, coefficients)
-        return _real(xp, coefficients, exit_degree)
+        parts = np.ascontiguousarray(np.stack((L.real, L.imag)).mT)
+        channels = max(L.shape[1], kappa.shape[3])
+        real = np.empty((coupling.weight.shape[2], (exit_degree + 1) ** 2, channels), light.dtype)
+        kernels.couple(parts, kappa, coupling.weight, real)
+        return real
+    L = xp.concat((L, xp.zeros_like(L[:1, :])), axis=0)
+    kappa = xp.reshape(kappa, (-1, kappa.shape[-1]))
     kappa_at, light_at = (xp.asarray(x, device=light.device) for x in (coupling.kappa_at, coupling.light_at))
     weight = like(coupling.weight, light)[..., None]
-    coefficients = 0.0
+    coefficients: Any = 0.0
     for i in range(exit_degree + 1):
         part = xp.take(kappa, xp.reshape(kappa_at[i, ...], (-1,)), axis=0) * xp.reshape(weight[i, ...], (-1, 1))
         coefficients = coefficients + part * xp.take(L, xp.reshape(light_at[i, ...], (-1,)), axis=0)
@@ -130,7 +130,8 @@ def _fitting(light: Array, transfer: Array) -> tuple[Any, Array, Array]:
 @dataclasses.dataclass(frozen=True, eq=False)
 class _Coupling:
     """For each term i of the sum over l (j = l + p - 2 i), each p, s >= 0 and each j, M: where L and kappa stand, and
-    (-1)^s <l M+s p -s | j M>. `kappa` (p, i, l, q): what rho_lpq counts in kappa_lpj."""
+    <l M+s p -s | j M>, times sqrt2 where s > 0. So Re and -Im of the sums are the real B_ps and B_p,-s, whose signs
+    (-1)^s cancel those of c_jM. `kappa` (p, i, l, q): what rho_lpq counts in kappa_lpj."""
 
     light_at: np.ndarray
     kappa_at: np.ndarray
@@ -139,7 +140,7 @@ class _Coupling:
 
 
 @lru_cache(maxsize=8)
-def _coupling(degree: int, exit_degree: int, highest: int) -> _Coupling:
+def _coupling(degree: int, exit_degree: int, highest: int, dtype: str) -> _Coupling:
     l = np.arange(degree + 1)[:, None]
     q = np.arange(highest + 1)
     kappa = np.zeros((exit_degree + 1, exit_degree + 1, degree + 1, highest + 1))
@@ -160,13 +161,13 @@ def _coupling(degree: int, exit_degree: int, highest: int) -> _Coupling:
             exists = (l >= 0) & (l <= degree) & (np.abs(m) <= l)
             light_at[i, k] = np.where(exists, l * (l + 1) + m, (degree + 1) ** 2)
             kappa_at[i, k] = (p * (exit_degree + 1) + i) * (degree + 1) + np.clip(l, 0, degree)
-            weight[i, k] = (-1.0) ** s * np.where(exists, clebsch_gordan(l, m, p, np.array(-s), j), 0)
-    return _Coupling(light_at, kappa_at, weight, kappa)
+            weight[i, k] = np.where(exists, clebsch_gordan(l, m, p, np.array(-s), j), 0) * (math.sqrt(2) if s else 1)
+    return _Coupling(light_at, kappa_at, weight.astype(dtype), kappa)
 
 
 def _real(xp: Any, coefficients: Array, exit_degree: int) -> Array:
-    """Real coefficients ((J+1)^2, (P+1)^2, C) of complex ones (sets of p, s >= 0, (J+1)^2, C): the real b_ps are
-    (-1)^s sqrt2 Re B_ps and, at -s, -(-1)^s sqrt2 Im B_ps."""
+    """Real coefficients ((J+1)^2, (P+1)^2, C) of Re and, at -s, of -Im of functions given by complex ones, (sets of p,
+    s >= 0, (J+1)^2, C)."""
     degree = math.isqrt(coefficients.shape[1]) - 1
     j, M = degrees_and_orders(degree)
     mirror = xp.asarray(j * (j + 1) - M, device=coefficients.device)
@@ -181,8 +182,7 @@ def _real(xp: Any, coefficients: Array, exit_degree: int) -> Array:
     parts: list[Any] = [None] * (exit_degree + 1) ** 2
     sets = [(p, s) for p in range(exit_degree + 1) for s in range(p + 1)]
     for k, (p, s) in enumerate(sets):
-        sign = (-1) ** s * math.sqrt(2) if s else 1.0
-        parts[p * (p + 1) + s] = sign * real[k, ...]
+        parts[p * (p + 1) + s] = real[k, ...]
         if s:
-            parts[p * (p + 1) - s] = -sign * imaginary[k, ...]
+            parts[p * (p + 1) - s] = -imaginary[k, ...]
     return xp.stack(parts, axis=1)

@@ -20,7 +20,7 @@ import numpy as np
 from .._kernels import row_pairs as kernels
 from .fourier import Transforms
 from .grids import Grid
-from .tiles import LANES, empty_tiles
+from .tiles import LANES, scratch_tiles
 
 _PIECE = 2**19  # bytes of rows taken at once
 
@@ -35,7 +35,7 @@ class Matrices:
         """Tiles of values (rows, columns, C), times `weights` (2, pairs); the equator counts twice."""
         channels = values.shape[2]
         image = np.ascontiguousarray(values).reshape(self.grid.rows, -1)
-        tiles = empty_tiles(self.degree + 1, 4 * channels, weights.shape[1], values.dtype)
+        tiles = scratch_tiles(self.degree + 1, 4 * channels, weights.shape[1], values.dtype)
         matrices, sums = self._matrices(values.dtype), self._sums(tiles)
         for pairs in _pieces(self.grid, image[:2].nbytes):
             quarters = self._quarters(channels, pairs, values.dtype)

@@ -9,6 +9,9 @@ need of sixteen rings at once.
 
 from __future__ import annotations
 
+import math
+import threading
+
 import numpy as np
 
 from .._kernels import legendre as kernels
@@ -19,6 +22,30 @@ LANES = kernels.LANES
 def empty_tiles(orders: int, channels: int, rings: int, dtype: np.dtype) -> np.ndarray:
     """Memory for `rings` rings."""
     return np.empty((-(-rings // LANES), orders, channels, LANES), dtype)
+
+
+_KEPT = 2**24  # bytes
+
+
+class _Scratch(threading.local):
+    bytes = np.empty(0, np.uint8)
+
+
+_scratch = _Scratch()
+
+
+def scratch_tiles(orders: int, channels: int, rings: int, dtype: np.dtype) -> np.ndarray:
+    """The same for work that ends before this thread next asks: up to some size, memory that it has had before.
+
+    A system hands out fresh memory page by page, which can cost as long as the sums that fill it.
+    """
+    shape = -(-rings // LANES), orders, channels, LANES
+    size = math.prod(shape) * np.dtype(dtype).itemsize
+    if size > _KEPT:
+        return np.empty(shape, dtype)
+    if size > _scratch.bytes.size:
+        _scratch.bytes = np.empty(size, np.uint8)
+    return _scratch.bytes[:size].view(dtype).reshape(shape)
 
 
 def tiled(rings: np.ndarray) -> np.ndarray:
