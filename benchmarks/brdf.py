@@ -30,6 +30,8 @@ MODELS = {
     "Ward, bounded": gn.Ward(0.4, 0.1, 0.3, bounded=True),
     "TorranceSparrow": gn.TorranceSparrow(0.4, 0.3, 1.6, 0.2),
     "KajiyaKay": gn.KajiyaKay(0.3, 0.3, 30.0),
+    "ABC, RGB": gn.ABC(0.1, [2.0, 3.0, 4.0], 120.0, 1.4, 1.5),
+    "ShiftedGamma": gn.ShiftedGamma(0.22, 0.55, 0.45, 0.92, 3.6, 0.05, -0.02, 2.8, 0.0037, 9.7, 0.0),
     "GGX, dielectric": gn.Microfacet(gn.GGX(0.3), gn.Fresnel(1.5)),
     "GGX, anisotropic metal": gn.Microfacet(gn.GGX(0.1, 0.3), METAL),
     "Beckmann, dielectric": gn.Microfacet(gn.Beckmann(0.3), gn.Fresnel(1.5)),

@@ -23,6 +23,10 @@ from gonio.brdf.model import BRDF
 from gonio.rendering import explicit
 
 ORDERS = range(6)
+FITS = {
+    "sgd": ("alum-bronze", "blue-acrylic", "teflon", "white-fabric"),
+    "abc": ("nickel", "red-plastic", "teflon", "white-paint"),
+}
 EYES = ((2.7, -3.5, 1.2), (-1.0, 3.0, -2.0), (-3.0, -1.0, 4.0))
 
 
@@ -39,6 +43,9 @@ def brdfs(data: Path) -> dict[str, BRDF]:
         "Ward .2": gn.Ward(0.3, 0.2, 0.2),
         "Phong 30": gn.Phong(0.5, 30.0),
     }
+    for kind, materials in FITS.items():
+        fits = gn.read_merl_fits(data / "brdf" / "merl-fits" / f"{kind}_params.json")
+        found |= {f"MERL {name}, {kind.upper()}": fits[name] for name in materials}
     for path in sorted((data / "brdf" / "cornell").glob("*.brdf")):
         found[f"Cornell {path.stem}"] = gn.HalfDifferenceTable.of(gn.read_cornell(path))
     for path in sorted((data / "brdf" / "rgl").glob("*.bsdf")):
@@ -68,6 +75,19 @@ def accuracy(brdf: BRDF) -> list[float]:
     squares = (rho**2).sum(axis=-1)
     squares[:, :, 1:] *= 2
     return [float(squares[:, : p + 1].sum() / energy.sum()) for p in ORDERS]
+
+
+def cabral(brdf: BRDF, light: gn.Environment, n: np.ndarray, wo: np.ndarray) -> np.ndarray:
+    """Cabral's interpolation between integrals over every texel: twelve eyes, each seeing the same mirror direction."""
+    weights, R = explicit.cabral_weights(wo), gn.reflect(wo, n)
+    total = 0.0
+    for k, corner in enumerate(explicit.icosahedron()[0]):
+        used = weights[:, k] > 0
+        normal, eye = gn.normalise(R + corner + 1e-9 * wo), np.broadcast_to(corner, wo.shape)
+        part = np.zeros((len(n), 3))
+        part[used] = gn.radiance(brdf, light, gn.frame(normal[used]), eye[used])
+        total = total + weights[:, k, None] * part
+    return total
 
 
 def picture(path: Path, images: list[np.ndarray], masks: list[np.ndarray], scale: float) -> None:
@@ -130,6 +150,7 @@ def main(data: Path, folder: Path) -> None:
             ):
                 field = sum(method(lobe, n, wo) for lobe in maps.lobes)
                 row[f"{room}: {label}"] = f"{relative(np.maximum(field, 0), exact):.3f}"
+            row[f"{room}: Cabral, from integrals"] = f"{relative(cabral(brdf, light, n, wo), exact):.3f}"
             file = folder / f"{room}-{name.lower().replace(' ', '-').replace(',', '').replace('.', '')}.png"
             quick = maps.radiance(n, wo)
             picture(file, [exact, quick, 10 * np.abs(quick - exact)], masks, 0.5 / float(np.quantile(exact, 0.9)))

@@ -6,6 +6,8 @@ from .brdf.fresnel import Fresnel as Fresnel
 from .brdf.fresnel import Schlick as Schlick
 from .brdf.kajiya_kay import KajiyaKay as KajiyaKay
 from .brdf.lafortune import Lafortune as Lafortune
+from .brdf.merl_models import ABC as ABC
+from .brdf.merl_models import ShiftedGamma as ShiftedGamma
 from .brdf.microfacet import Microfacet as Microfacet
 from .brdf.ndf import GGX as GGX
 from .brdf.ndf import Beckmann as Beckmann
@@ -54,6 +56,7 @@ from .files.ktx2 import write_ktx2 as write_ktx2
 from .files.ktx2 import write_split_sum as write_split_sum
 from .files.merl import read_merl as read_merl
 from .files.merl import write_merl as write_merl
+from .files.merl_fits import read_merl_fits as read_merl_fits
 from .files.meshes import read_mesh as read_mesh
 from .files.rgl import read_rgl as read_rgl
 from .files.shrm import read_shrm as read_shrm

@@ -9,6 +9,9 @@ import gonio as gn
 
 METAL = (np.array([0.2, 0.92, 1.1]), np.array([3.9, 2.45, 2.14]))
 
+# ks, alpha, p, scale, f0, f1, shadow, c, k and theta_0 of violet rubber in red, as Bagher et al. published them
+SHIFTED_GAMMA = 0.547456, 0.445092, 0.923481, 3.58673, 0.0518927, -0.0208955, 2.83007, 0.00374266, 9.67534, -0.0037936
+
 
 def directions(n, seed=1):
     """n directions above the surface, uniform."""
@@ -57,6 +60,16 @@ MODELS = {
         False,
     ),
     "kajiya-kay": (gn.KajiyaKay(0.2, 0.5, 25.0), lambda wi, wo: plain.kajiya_kay(wi, wo, 0.2, 0.5, 25.0), False),
+    "abc": (
+        gn.ABC(0.1, [2.0, 3.0, 4.0], 120.0, 1.4, 1.5),
+        lambda wi, wo: [plain.abc(wi, wo, 0.1, a, 120.0, 1.4, 1.5) for a in (2.0, 3.0, 4.0)],
+        True,
+    ),
+    "shifted gamma": (
+        gn.ShiftedGamma(0.2, *SHIFTED_GAMMA),
+        lambda wi, wo: plain.shifted_gamma(wi, wo, 0.2, *SHIFTED_GAMMA),
+        True,
+    ),
     "ggx": (
         gn.Microfacet(gn.GGX(0.3), gn.Fresnel(1.5)),
         _facets("ggx", 0.3, 0.3, "correlated", lambda c: plain.fresnel(c, 1.5)),

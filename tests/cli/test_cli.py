@@ -227,6 +227,20 @@ def test_terms_add_and_weights_scale():
     np.testing.assert_array_equal(brdf.f(wi, wo), expected.f(wi, wo))
 
 
+def test_a_material_of_a_file_of_fits_is_named_after_a_colon(capsys, tmp_path):
+    fits = tmp_path / "fits.json"
+    fits.write_text('{"red-clay": {"kD": [0.5, 0.2, 0.1], "A": [0, 0, 0], "B": 1, "C": 1, "ior": 1.5}}')
+    straight = [[0.0, 0.0, 1.0]]
+    np.testing.assert_allclose(
+        parse.reflectance([f"{fits}:red-clay"]).f(straight, straight), [[0.5 / np.pi, 0.2 / np.pi, 0.1 / np.pi]]
+    )
+    with pytest.raises(gn.GonioError, match="no material 'red-cly'; write .*:red-clay"):
+        parse.reflectance([f"{fits}:red-cly"])
+    code, out, _ = run(capsys, "info", fits, "--json")
+    assert code == 0
+    assert json.loads(out)["materials"] == ["red-clay"]
+
+
 def test_a_square_probe_lights_a_ball_once_its_layout_is_named(capsys, tmp_path):
     probe = tmp_path / "probe.pfm"  # a format whose header says nothing of layouts
     gn.write_image(probe, np.ones((16, 16, 3)))

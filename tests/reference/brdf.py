@@ -123,3 +123,26 @@ def microfacet(wi, wo, ax, ay, kind, shadowing, F):
         Li, Lo = smith(wi, ax, ay, kind), smith(wo, ax, ay, kind)
         G = 1 / (1 + Li + Lo) if shadowing == "correlated" else 1 / ((1 + Li) * (1 + Lo))
     return D * G * F(cosine) / (4 * wi[2] * wo[2])
+
+
+def abc(wi, wo, kd, a, b, c, ior):
+    """Löw et al. 2012, the microfacet model, one channel."""
+    theta_i, _, theta_o, _, h = angles(wi, wo)
+    theta_d = math.acos(min(float(np.dot(wi, h)), 1.0))
+    D = a / (1 + b * (1 - h[2])) ** c
+    G = min(1.0, 2 * h[2] * wi[2] / math.cos(theta_d), 2 * h[2] * wo[2] / math.cos(theta_d))
+    F = fresnel(math.cos(theta_d), ior)
+    return kd / math.pi + D * F * G / (math.pi * math.cos(theta_i) * math.cos(theta_o))
+
+
+def shifted_gamma(wi, wo, kd, ks, alpha, p, N, f0, f1, L, c, k, theta_0):
+    """Bagher et al. 2012, 9-14, one channel."""
+    theta_i, _, theta_o, _, h = angles(wi, wo)
+    theta_h, theta_d = math.acos(h[2]), math.acos(min(float(np.dot(wi, h)), 1.0))
+    t = alpha + math.tan(theta_h) ** 2 / alpha
+    D = N * math.exp(-t) / t**p / (math.pi * math.cos(theta_h) ** 4)
+    F = f0 - f1 * math.cos(theta_d) + (1 - f0) * (1 - math.cos(theta_d)) ** 5
+    G = 1.0
+    for theta in (theta_i, theta_o):
+        G *= min(max(1 + L * (1 - math.exp(min(c * max(theta - theta_0, 0.0) ** k, 700.0))), 0.0), 1.0)
+    return max(kd + ks * F * D * G / (math.cos(theta_i) * math.cos(theta_o)), 0.0) / math.pi

@@ -39,13 +39,17 @@ class Fresnel(Reflectance):
     bounds: ClassVar[dict[str, Bounds]] = {"eta": Bounds(1.0, 10.0, colour=True)}
 
     def _F(self, xp: Any, c: Array) -> Array:
-        eta = like(self.eta, c)
-        # c = 0 with eta = 1 is 0 / 0: light that runs along a facet of nothing. Nothing reflects nothing.
-        tiny = xp.finfo(c.dtype).tiny ** 0.5
-        g = xp.sqrt(xp.clip(eta * eta - 1 + c * c, tiny, None))
-        s = (g - c) / (g + c)
-        p = (c * (g + c) - 1) / (c * (g - c) + 1)
-        return 0.5 * s * s * (1 + p * p)
+        return dielectric(xp, like(self.eta, c), c)
+
+
+def dielectric(xp: Any, eta: Array, c: Array) -> Array:
+    """F of clear dielectrics of index `eta` >= 1 at cosines `c` in [0, 1], broadcast."""
+    # c = 0 with eta = 1 is 0 / 0: light that runs along a facet of nothing. Nothing reflects nothing.
+    tiny = xp.finfo(c.dtype).tiny ** 0.5
+    g = xp.sqrt(xp.clip(eta * eta - 1 + c * c, tiny, None))
+    s = (g - c) / (g + c)
+    p = (c * (g + c) - 1) / (c * (g - c) + 1)
+    return 0.5 * s * s * (1 + p * p)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -14,6 +14,7 @@ RAW = (".dng", ".cr2", ".cr3", ".nef", ".arw", ".raf", ".orf", ".rw2")
 BRDFS = (".binary", ".bsdf", ".brdf")
 MESHES = (".obj", ".ply", ".stl", ".off")
 MAPS = (".gonio", ".ktx2")
+FITS = ".json"
 
 
 def info(
@@ -48,7 +49,9 @@ def describe(path: Path) -> dict[str, Any]:
         return _mesh(path)
     if suffix in MAPS:
         return _shrm(path) if suffix == ".gonio" else _texture(path)
-    known = " ".join(IMAGES + BRDFS + MESHES + MAPS)
+    if suffix == FITS:
+        return _fits(path)
+    known = " ".join((*IMAGES, *BRDFS, FITS, *MESHES, *MAPS))
     raise FileError(f"{path}: not a kind of file that gonio knows ({known}, and camera raw).")
 
 
@@ -134,6 +137,18 @@ def _brdf(path: Path) -> dict[str, Any]:
     if albedo.max() > 1.01:
         facts["looks wrong"] = f"more light leaves than arrives at {angles[albedo.max(axis=1).argmax()]:g} degrees"
     return facts
+
+
+def _fits(path: Path) -> dict[str, Any]:
+    import gonio as gn
+
+    fits = gn.read_merl_fits(path)
+    return {
+        "kind": "fits of BRDFs",
+        "models": sorted({type(fit).__name__ for fit in fits.values()}),
+        "materials": list(fits),
+        "as a BRDF": f"--brdf {path}:{next(iter(fits))}",
+    }
 
 
 def _mesh(path: Path) -> dict[str, Any]:

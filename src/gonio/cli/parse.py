@@ -2,6 +2,7 @@
 
 --brdf lambert:albedo=.5/.3/.1  --brdf ggx:alpha=.2,eta=1.5         terms that are added
 --brdf gold.bsdf                                                    a measured file
+--brdf sgd_params.json:teflon                                       a material of a file of fits
 --sun 1,0,1   --sun 1,0,1:3/2.8/2.5                                 direction[:irradiance]
 """
 
@@ -79,6 +80,8 @@ def _term(text: str) -> BRDF:
     import gonio as gn
 
     name, _, rest = text.partition(":")
+    if Path(name).suffix.lower() == ".json":
+        return _fitted(name, rest)
     if name not in ANALYTIC and name not in FACETS:
         if Path(text).suffix and (Path(text).exists() or "/" in text):
             return gn.read_brdf(text)
@@ -96,6 +99,16 @@ def _term(text: str) -> BRDF:
     else:
         brdf = _made(getattr(gn, ANALYTIC[name]), given, text)
     return brdf if weight is None else weight * brdf
+
+
+def _fitted(path: str, material: str) -> BRDF:
+    import gonio as gn
+
+    fits = gn.read_merl_fits(path)
+    if material in fits:
+        return fits[material]
+    near = difflib.get_close_matches(material, fits, n=1) or [next(iter(fits))]
+    raise ParameterError(f"{path} has no material '{material}'; write {path}:{near[0]}, for instance.")
 
 
 def _microfacet(facets: str, given: dict[str, Any], text: str) -> BRDF:
