@@ -234,7 +234,7 @@ def test_a_material_of_a_file_of_fits_is_named_after_a_colon(capsys, tmp_path):
     np.testing.assert_allclose(
         parse.reflectance([f"{fits}:red-clay"]).f(straight, straight), [[0.5 / np.pi, 0.2 / np.pi, 0.1 / np.pi]]
     )
-    with pytest.raises(gn.GonioError, match="no material 'red-cly'; write .*:red-clay"):
+    with pytest.raises(gn.GonioError, match="no material 'red-cly'"):
         parse.reflectance([f"{fits}:red-cly"])
     code, out, _ = run(capsys, "info", fits, "--json")
     assert code == 0
