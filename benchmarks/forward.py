@@ -3,8 +3,8 @@
     python benchmarks/forward.py MAP [repetitions]
 
 MAP is an environment map (lat-long). One thread, process CPU time, medians; every figure with its error. The tables are
-those of RH: 5.4 (Phong) and 5.5 (microfacets), 128 x 128 maps of a 128 x 128 light; the angular side is a compiled loop
-that leaves out what lies beyond the lobe.
+those of RH: 5.3 (growth of the work), 5.4 (Phong) and 5.5 (microfacets), 128 x 128 maps of a 128 x 128 light; the
+angular side is a compiled loop that leaves out what lies beyond the lobe.
 """
 
 from __future__ import annotations
@@ -108,6 +108,46 @@ def once(work: Callable[[], object]) -> float:
     return (time.process_time() - start) * 1e3
 
 
+def table_5_3(light: gn.Environment, repetitions: int) -> None:
+    """Nanoseconds an output pixel: against RH's W S^2 (angular), F (one map) and F (each coefficient of an SHRM)."""
+    rng = np.random.default_rng(1)
+
+    def pixel(F: int, P: int, size: int) -> float:
+        """Of a map of `size` x 2 `size` RGB pixels, for each coefficient of an SHRM."""
+        grid, transfer = gn.LatLong(size, 2 * size), rng.normal(size=(F + 1, P + 1, P + 1, 3)).astype(np.float32)
+        c = rng.normal(size=((F + 1) ** 2, 3)).astype(np.float32)
+        taken = times({"": lambda: _maps(c, transfer, grid)}, repetitions)[""]
+        return 1e6 * taken / (2 * size * size * (P + 1) ** 2)
+
+    print("\nRH table 5.3: ns an output pixel and coefficient")
+    rows = [("F = 24, P = 0; S", [(24, 0, size) for size in (64, 128, 256, 512, 1024)], 2)]
+    rows += [("P = 0, S = 256; F", [(F, 0, 256) for F in (8, 16, 32, 64, 96)], 0)]
+    rows += [("F = 24, S = 128; P", [(24, P, 128) for P in range(6)], 1)]
+    for name, cases, varied in rows:
+        print(f"  {name:20}" + "  ".join(f"{case[varied]:5}: {pixel(*case):6.1f}" for case in cases))
+    for s in (8, 128):
+        found = []
+        for size in (32, 64, 128):
+            grid = gn.LatLong(size, size)
+            image = light.resampled(gn.LatLongMap(), size).image.reshape(size, size, 2, 3).mean(axis=2)
+            w = grid.directions().reshape(-1, 3).astype(np.float32)
+            E = (image * grid.weights[:, None, None]).astype(np.float32).reshape(-1, 3)
+            out = np.empty((size * size, 3), np.float32)
+            cut = 0.05 ** (1 / (s + 1))
+            phong_sum(w, E, w[:1], float(s), cut, out[:1])
+            slow = once(lambda w=w, E=E, cut=cut, out=out, s=s: phong_sum(w, E, w, float(s), cut, out))
+            found.append(f"{size:5}: {1e6 * slow / size**2:6.0f}")
+        print(f"  {f'angular, Phong {s}; S':20}" + "  ".join(found))
+
+
+def _maps(c: np.ndarray, transfer: np.ndarray, grid: gn.LatLong) -> np.ndarray:
+    """What an SHRM holds, or one map where it has a single coefficient."""
+    if transfer.shape[1] > 1:
+        c = world_coefficients(c, transfer)
+        c = c.reshape(c.shape[0], -1)
+    return gn.synthesis(c, grid)
+
+
 def table_5_4(light: gn.Environment, repetitions: int) -> None:
     grid, out = gn.LatLong(S, S), np.empty((S * S, 3), np.float32)
     image, R = square(light)
@@ -167,8 +207,7 @@ def shrm_maps(repetitions: int) -> None:
             rho = rng.normal(size=(F + 1, P + 1, P + 1, 3)).astype(dtype)
 
             def ours(light: np.ndarray = light, rho: np.ndarray = rho) -> np.ndarray:
-                c = world_coefficients(light, rho)
-                return gn.synthesis(c.reshape(c.shape[0], -1), grid)
+                return _maps(light, rho, grid)
 
             works = {"gonio, world maps": ours}
             try:
@@ -229,6 +268,7 @@ if __name__ == "__main__":
     room = gn.read_environment(sys.argv[1])
     count = int(sys.argv[2]) if len(sys.argv) > 2 else 15
     shrm_maps(count)
+    table_5_3(room, count)
     table_5_4(room, count)
     table_5_5(room, count)
     pictures(room)
