@@ -24,6 +24,9 @@ from .brdf.ward import Ward as Ward
 from .cameras import Orthographic as Orthographic
 from .cameras import Pinhole as Pinhole
 from .cameras import look_at as look_at
+from .capture.integration import integrate_normals as integrate_normals
+from .capture.model import Capture as Capture
+from .capture.photometric_stereo import photometric_stereo as photometric_stereo
 from .directions import from_half_difference as from_half_difference
 from .directions import from_spherical as from_spherical
 from .directions import from_uvw as from_uvw
@@ -36,6 +39,8 @@ from .directions import uvw as uvw
 from .errors import GonioError as GonioError
 from .errors import GonioWarning as GonioWarning
 from .files.brdfs import read_brdf as read_brdf
+from .files.captures import read_capture as read_capture
+from .files.captures import write_capture as write_capture
 from .files.cornell import read_cornell as read_cornell
 from .files.engine_harmonics import Engine as Engine
 from .files.engine_harmonics import from_engine as from_engine
@@ -54,6 +59,8 @@ from .files.ktx2 import read_ktx2 as read_ktx2
 from .files.ktx2 import write_chain as write_chain
 from .files.ktx2 import write_ktx2 as write_ktx2
 from .files.ktx2 import write_split_sum as write_split_sum
+from .files.lp import read_lp as read_lp
+from .files.lp import write_lp as write_lp
 from .files.merl import read_merl as read_merl
 from .files.merl import write_merl as write_merl
 from .files.merl_fits import read_merl_fits as read_merl_fits

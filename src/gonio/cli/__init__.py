@@ -13,7 +13,7 @@ from typing import Any
 import typer
 
 from ..errors import GonioError
-from . import convert, demo, info, prefilter, render, sh
+from . import calibrate, convert, demo, info, normals, prefilter, render, sh
 
 Usage: Any = typer.BadParameter.__base__  # click's error for whatever is mistyped, which typer does not name
 
@@ -41,7 +41,15 @@ def gonio(
     """From photographs of a known shape to reflectance and light that you can render."""
 
 
-for verb in (info.info, convert.convert, render.render, prefilter.prefilter, demo.demo):
+for verb in (
+    info.info,
+    convert.convert,
+    calibrate.calibrate,
+    normals.normals,
+    render.render,
+    prefilter.prefilter,
+    demo.demo,
+):
     app.command(no_args_is_help=verb is not demo.demo)(verb)
 app.add_typer(sh.app, name="sh")
 

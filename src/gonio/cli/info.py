@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import json
 import math
+import warnings
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import typer
+
+if TYPE_CHECKING:
+    from ..capture.model import Capture
 
 IMAGES = (".exr", ".hdr", ".pic", ".pfm", ".png", ".tif", ".tiff", ".jpg", ".jpeg", ".tga")
 RAW = (".dng", ".cr2", ".cr3", ".nef", ".arw", ".raf", ".orf", ".rw2")
@@ -15,10 +19,11 @@ BRDFS = (".binary", ".bsdf", ".brdf")
 MESHES = (".obj", ".ply", ".stl", ".off")
 MAPS = (".gonio", ".ktx2")
 FITS = ".json"
+CAPTURES = (".lp", ".toml")
 
 
 def info(
-    files: list[Path] = typer.Argument(..., help="Images, environment maps, BRDF files, meshes, prefiltered maps."),
+    files: list[Path] = typer.Argument(..., help="Images, environment maps, BRDFs, meshes; folders of captures."),
     as_json: bool = typer.Option(False, "--json", help="One JSON object a file, a line each."),
     picture: Path | None = typer.Option(None, "--picture", help="A PNG to look at: an image, or the lobes of BRDFs."),
 ) -> None:
@@ -41,6 +46,8 @@ def describe(path: Path) -> dict[str, Any]:
     from gonio.errors import FileError
 
     suffix = path.suffix.lower()
+    if path.is_dir() or suffix in CAPTURES:
+        return _capture(path)
     if suffix in IMAGES + RAW:
         return _image(path)
     if suffix in BRDFS:
@@ -64,12 +71,17 @@ def _draw(files: list[Path], picture: Path) -> None:
     if picture.suffix.lower() != ".png":
         raise ParameterError(f"--picture {picture}: the picture is a PNG; end its name in .png.")
     kinds = {path.suffix.lower() for path in files}
+    if len(files) == 1 and (files[0].is_dir() or kinds <= set(CAPTURES)):
+        from gonio.viewer.captures import contact_sheet
+
+        contact_sheet(picture, _captured(files[0]))
+        return
     if kinds <= set(BRDFS):
         lobes(picture, {path.stem: gn.read_brdf(path) for path in files})
     elif len(files) == 1 and kinds <= set(IMAGES + RAW):
         gn.write_image(picture, gn.tone_map(gn.read_image(files[0]).clip(0), exposure=None))
     else:
-        raise ParameterError("--picture shows one image, or BRDF files together.")
+        raise ParameterError("--picture shows one image or capture, or BRDF files together.")
 
 
 def _image(path: Path) -> dict[str, Any]:
@@ -136,6 +148,35 @@ def _brdf(path: Path) -> dict[str, Any]:
     }
     if albedo.max() > 1.01:
         facts["looks wrong"] = f"more light leaves than arrives at {angles[albedo.max(axis=1).argmax()]:g} degrees"
+    return facts
+
+
+def _captured(path: Path) -> Capture:
+    """What is sound of a capture. That its encoding is not stated is among its facts."""
+    import gonio as gn
+    from gonio.errors import EncodingWarning
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", EncodingWarning)
+        return gn.read_capture(path, partial=True)
+
+
+def _capture(path: Path) -> dict[str, Any]:
+    capture = _captured(path)
+    rows, columns = capture.photographs.size
+    facts: dict[str, Any] = {
+        "kind": "capture",
+        "layout": capture.layout,
+        "photographs": len(capture.photographs),
+        "rows": rows,
+        "columns": columns,
+        "lights": "unknown" if capture.directions is None else len(capture.directions),
+        "object": f"{capture.mask.mean():.1%} of the pixels",
+        "encoding": "not stated" if getattr(capture.photographs, "assumed", False) else "stated",
+        "normals": "given" if capture.normals is not None else "unknown",
+    }
+    if capture.findings:
+        facts["looks wrong"] = "; ".join(capture.findings)
     return facts
 
 

@@ -64,10 +64,16 @@ def read_image(path: str | os.PathLike[str], encoding: Encoding | None = None) -
     _require_encoding(encoding)
     raster = read_raster(path)
     chosen = encoding if encoding is not None else raster.encoding
-    image = _light(raster.samples, "srgb" if chosen is None else chosen)
-    _require_finite(path, image)
+    image = light(path, raster, "srgb" if chosen is None else chosen)
     for kind, message in _doubts(raster, image, chosen is None):
         warnings.warn(f"{path}: {message}", kind, stacklevel=2)
+    return image
+
+
+def light(path: Path, raster: Raster, encoding: Encoding) -> np.ndarray:
+    """What a file's samples stand for: linear (rows, columns, 3), float32. Raises `FileError` for NaN and infinity."""
+    image = _light(raster.samples, encoding)
+    _require_finite(path, image)
     return np.repeat(image, 3, axis=2) if image.shape[2] == 1 else image
 
 

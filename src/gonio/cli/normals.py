@@ -1,0 +1,67 @@
+"""`gonio normals`: normals, albedo and heights of a matte object from photographs under known lights."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import typer
+
+from . import captures
+from .progress import bar
+
+
+def normals(
+    capture: Path = captures.FOLDER,
+    output: Path = typer.Option(..., "--output", "-o", help="A folder for normals.png, relief.exr and relief.png."),
+    lights: Path | None = typer.Option(None, "--lights", help="An .lp to use instead: its lights in the same order."),
+    encoding: str = captures.ENCODING,
+    partial: bool = captures.PARTIAL,
+    plain: bool = typer.Option(False, "--plain", help="Least squares of all photographs, shadows and highlights too."),
+    as_json: bool = typer.Option(False, "--json", help="One JSON object."),
+) -> None:
+    """Photometric stereo: normals, albedo, how well they are known, and the heights that have these normals."""
+    import numpy as np
+
+    import gonio as gn
+    from gonio.files.whole import writable
+    from gonio.viewer.captures import relief_picture
+
+    scene = captures.read(capture, encoding, partial, lights)
+    output.mkdir(parents=True, exist_ok=True)
+    names = ("normals.png", "relief.exr", "relief.png")
+    for name in names:
+        writable(output / name)
+    with bar("normals") as progress:
+        relief = gn.photometric_stereo(scene, robust=not plain, progress=progress)
+    found = np.isfinite(relief.error) & (relief.normals[..., 2] > 0)
+    if not found.any():
+        raise gn.GonioError(f"{capture}: no pixel has a normal. Do the lights belong to these photographs?")
+    upright = np.where(found[..., None], relief.normals, [0.0, 0.0, 1.0])
+    # What is known to a degree counts as a hundred of what is known to ten.
+    weights = np.where(found, 1 / (relief.error**2 + np.radians(0.1) ** 2), 0.0)
+    surface = gn.integrate_normals(upright, found, weights)
+    codes = np.where(found[..., None], 0.5 * upright + 0.5, 0.0)
+    gn.write_image(output / "normals.png", codes, "linear", bits=16, clip=True)
+    layers = {"normals": relief.normals, "albedo": relief.albedo, "residual": relief.residual, "error": relief.error}
+    gn.write_layers(output / "relief.exr", {**layers, "heights": surface.heights})
+    relief_picture(output / "relief.png", relief, surface.heights)
+    facts = {
+        "photographs": len(scene.photographs),
+        "pixels": int(found.sum()),
+        "residual": float(np.median(relief.residual[found])),
+        "standard error, degrees": float(np.degrees(np.median(relief.error[found]))),
+        "heights": surface.reason,
+    }
+    if scene.normals is not None:
+        both = found & scene.mask
+        cosine = np.sum(relief.normals[both] * scene.normals[both], axis=1).clip(-1, 1)
+        facts["degrees from the given normals, mean"] = float(np.degrees(np.arccos(cosine)).mean())
+    if as_json:
+        typer.echo(json.dumps(facts))
+    else:
+        for name, value in facts.items():
+            typer.echo(f"{name:>36}  {value:.4g}" if isinstance(value, float) else f"{name:>36}  {value}")
+        typer.echo(f"{', '.join(names)} in {output}")
+    if not surface.converged:
+        raise typer.Exit(1)

@@ -1,0 +1,42 @@
+"""A capture's photographs in image files of one size, decoded when they are asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from ..capture.photographs import Photograph, Photographs
+from ..errors import FileError
+from .images import image_info, light, read_raster
+from .raster import Encoding
+
+
+class PhotographFiles(Photographs):
+    """Photographs at folder / names. encoding: as in `read_image`; where it is None, what a file states, or sRGB.
+
+    `assumed`: nothing states how their codes stand for light. Raises `FileError` where a file is no image, or they are
+    not of one size.
+    """
+
+    def __init__(self, folder: Path, names: Sequence[str], encoding: Encoding | None = None) -> None:
+        self.folder, self.names, self.encoding = folder, tuple(names), encoding
+        infos = [image_info(folder / name) for name in self.names]
+        self.size = infos[0].rows, infos[0].columns
+        self.assumed = encoding is None and any(info.encoding is None for info in infos)
+        for name, info in zip(self.names, infos, strict=True):
+            if (info.rows, info.columns) != self.size:
+                raise FileError(
+                    f"{folder / name} has {info.rows} x {info.columns} pixels, {self.names[0]} has "
+                    f"{self.size[0]} x {self.size[1]}: photographs of a capture are of one size."
+                )
+
+    def read(self, k: int) -> Photograph:
+        path = self.folder / self.names[k]
+        raster = read_raster(path)
+        chosen = self.encoding if self.encoding is not None else raster.encoding
+        radiance = light(path, raster, "srgb" if chosen is None else chosen)
+        codes = raster.samples.dtype.kind == "u"
+        clipped = raster.samples == (np.iinfo(raster.samples.dtype).max if codes else np.inf)
+        return Photograph(radiance, np.logical_or.reduce(np.moveaxis(clipped, -1, 0)))

@@ -1,0 +1,132 @@
+"""Captures to look at: contact sheets with their lights, and what photometric stereo made of them."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..capture.mirror_ball import Circle
+from ..capture.model import Capture
+from ..capture.photometric_stereo import Relief
+from ..files.whole import writing
+from ..rendering.tonemap import clipped, tone_map
+from .plots import INK
+
+_MOST = 30  # photographs on a sheet, evenly chosen
+_SIDE = 160  # pixels of one
+
+
+def contact_sheet(path: str | Path, capture: Capture) -> Path:
+    """Write a PNG of the photographs, all exposed alike, beside the directions of their lights seen from the camera."""
+    chosen = np.unique(np.linspace(0, len(capture.photographs) - 1, _MOST).astype(int))
+    thumbs = [_thumb(capture.photographs.read(int(k)).radiance) for k in chosen]
+    bright = float(np.quantile(np.stack([thumb.max(axis=2) for thumb in thumbs]), 0.98))
+    across = math.ceil(math.sqrt(1.5 * len(thumbs)))
+    down = math.ceil(len(thumbs) / across)
+    figure = _figure(1.15 * across + (4.4 if capture.directions is not None else 0.4), max(1.3 * down, 4.4))
+    parts = figure.add_gridspec(1, 2, width_ratios=(1.15 * across, 4.2)) if capture.directions is not None else None
+    grid = (parts[0] if parts else figure.add_gridspec(1, 1)[0]).subgridspec(down, across, hspace=0.25, wspace=0.05)
+    for place, k, thumb in zip(grid, chosen, thumbs, strict=False):
+        axes = figure.add_subplot(place)
+        axes.imshow(tone_map(thumb * (0.8 / bright) if bright > 0 else thumb, clipped))
+        axes.set_title(f"{k}", color=INK, fontsize=7, pad=2)
+        axes.set_axis_off()
+    if parts is not None:
+        _lights(figure.add_subplot(parts[1]), capture.directions, chosen)
+    return _save(figure, Path(path))
+
+
+def ball_picture(
+    path: str | Path, image: np.ndarray, circle: Circle, highlights: np.ndarray, directions: np.ndarray
+) -> Path:
+    """Write a PNG of a mirror ball (rows, columns, 3), its outline and highlights (N, 2), beside the lights (N, 3)."""
+    figure = _figure(9.4, 4.6)
+    left, right = figure.subplots(1, 2)
+    left.imshow(tone_map(_exposed(image), clipped), extent=(0, image.shape[1], image.shape[0], 0))
+    turn, (row, column) = np.linspace(0, 2 * math.pi, 181), circle.centre
+    left.plot(column + circle.radius * np.cos(turn), row + circle.radius * np.sin(turn), color="#d08a1c", linewidth=1.2)
+    left.scatter(highlights[:, 1], highlights[:, 0], s=22, facecolors="none", edgecolors="#e0218a", linewidths=1.0)
+    margin = 1.2 * circle.radius
+    left.set(xlim=(column - margin, column + margin), ylim=(row + margin, row - margin))
+    left.set_title("outline and highlights", color=INK, fontsize=8)
+    left.set_axis_off()
+    _lights(right, directions, np.arange(len(directions)))
+    return _save(figure, Path(path))
+
+
+def relief_picture(path: str | Path, relief: Relief, heights: np.ndarray | None = None) -> Path:
+    """Write a PNG of normals, albedo, residual, standard error and, where given, heights (rows, columns)."""
+    rows, columns = relief.used.shape
+    panels: list[tuple[str, np.ndarray, dict[str, Any]]] = [
+        ("normals", np.where(np.isfinite(relief.normals), 0.5 * relief.normals + 0.5, 1).clip(0, 1), {}),
+        ("albedo, relative", tone_map(_exposed(np.nan_to_num(relief.albedo)), clipped), {}),
+        ("residual, % of albedo", 100 * relief.residual, {"cmap": "magma"}),
+        ("standard error of the normal, degrees", np.degrees(relief.error), {"cmap": "magma"}),
+        ("photographs that count", np.where(relief.used > 0, relief.used, np.nan), {"cmap": "viridis"}),
+    ]
+    if heights is not None:
+        panels.append(("heights, pixels", heights, {"cmap": "viridis"}))
+    across = 3
+    side = 4.0
+    figure = _figure(across * side, math.ceil(len(panels) / across) * (side * rows / columns + 0.5))
+    for k, (title, image, style) in enumerate(panels):
+        axes = figure.add_subplot(math.ceil(len(panels) / across), across, k + 1)
+        if image.ndim == 2:
+            low, high = np.nanquantile(image, (0.01, 0.99)) if np.isfinite(image).any() else (0.0, 1.0)
+            shown = axes.imshow(image, vmin=low, vmax=max(high, low + 1e-9), **style)
+            bar = figure.colorbar(shown, ax=axes, fraction=0.04 * rows / columns, pad=0.02)
+            bar.ax.tick_params(colors=INK, labelsize=7)
+            bar.outline.set_edgecolor(INK)
+        else:
+            axes.imshow(image)
+        axes.set_title(title, color=INK, fontsize=9)
+        axes.set_axis_off()
+    return _save(figure, Path(path))
+
+
+def _lights(axes: Any, directions: Any, chosen: np.ndarray) -> None:
+    """Directions in the unit disc, x right and y up; those behind the sample are hollow."""
+    x, y, z = directions.T
+    ring = np.linspace(0, 2 * math.pi, 181)
+    for degrees in (30, 60, 90):
+        radius = math.sin(math.radians(degrees))
+        axes.plot(radius * np.cos(ring), radius * np.sin(ring), color=INK, linewidth=0.6, alpha=0.6)
+        axes.text(0, radius, f"{degrees}", color=INK, fontsize=6, ha="center", va="bottom")
+    axes.scatter(x, y, s=18, c=np.where(z > 0, "#d08a1c", "none"), edgecolors="#d08a1c", linewidths=0.8)
+    for k in chosen:
+        axes.annotate(f"{k}", (x[k], y[k]), textcoords="offset points", xytext=(3, 2), color=INK, fontsize=6)
+    axes.set(xlim=(-1.12, 1.12), ylim=(-1.12, 1.12), aspect="equal")
+    axes.set_title(f"{len(x)} lights, degrees from the camera", color=INK, fontsize=8)
+    axes.set_axis_off()
+
+
+def _thumb(image: np.ndarray) -> np.ndarray:
+    """An image of at most `_SIDE` pixels each way, each the mean of a block."""
+    step = max(1, math.ceil(max(image.shape[:2]) / _SIDE))
+    rows, columns = (n // step * step for n in image.shape[:2])
+    blocks = image[:rows, :columns].reshape(rows // step, step, columns // step, step, 3)
+    thumb: np.ndarray = blocks.mean(axis=(1, 3))
+    return thumb
+
+
+def _exposed(image: np.ndarray) -> np.ndarray:
+    bright = float(np.quantile(image.max(axis=2), 0.98))
+    return image * (0.8 / bright) if bright > 0 else image
+
+
+def _figure(width: float, height: float) -> Any:
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), dpi=110, layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def _save(figure: Any, path: Path) -> Path:
+    with writing(path) as temporary:
+        figure.savefig(temporary, transparent=True)
+    return path
