@@ -27,6 +27,8 @@ from .cameras import look_at as look_at
 from .capture.integration import integrate_normals as integrate_normals
 from .capture.model import Capture as Capture
 from .capture.photometric_stereo import photometric_stereo as photometric_stereo
+from .capture.simulation import Sensor as Sensor
+from .capture.simulation import simulate as simulate
 from .directions import from_half_difference as from_half_difference
 from .directions import from_spherical as from_spherical
 from .directions import from_uvw as from_uvw

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 
 import numpy as np
@@ -120,3 +121,24 @@ def test_what_is_missing_is_refused_in_one_line_that_tells_the_way_out(capsys, t
     assert code == 2
     assert "photo0.png" in err
     assert not (tmp_path / "lights.lp").exists()
+
+
+def test_a_simulated_folder_holds_the_truth_and_its_samples_are_the_brdf(capsys, tmp_path):
+    folder = tmp_path / "sim"
+    brdf = ("--brdf", "lambert:albedo=.5/.4/.3", "--brdf", "ggx:alpha=.4,eta=1.5")
+    code, out, _ = run(capsys, "simulate", "-o", folder, *brdf, "--size", 32, "--count", 9, "--misaligned", 1)
+    assert code == 0
+    assert "9 photographs of 32 x 32" in out
+    capture = gn.read_capture(folder)
+    truth = gn.read_lp(folder / "truth" / "dirs.lp").directions
+    off = np.degrees(np.arccos(np.sum(capture.directions * truth, axis=1).clip(-1, 1)))
+    assert 0.2 < np.sqrt(np.mean(off**2)) < 2
+    model = gn.Lambert([0.5, 0.4, 0.3]) + gn.Microfacet(gn.GGX(0.4), gn.Fresnel(1.5))
+    capture = dataclasses.replace(capture, directions=truth)
+    for block in capture.reflectance():
+        steep = block.wi[:, 2] > 0.2
+        # Normals and codes are rounded to 16 bits.
+        assert_allclose(block.value[steep], model.f(block.wi[steep], block.wo[steep]), rtol=0.01)
+    code, _, err = run(capsys, "simulate", "-o", folder)
+    assert code == 2
+    assert "not empty" in err

@@ -8,6 +8,8 @@ Not here: reading one (`files/captures.py`), several cameras.
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,15 +18,19 @@ from ..directions import require_unit
 from ..errors import ArrayError
 from .photographs import Photographs
 
+if TYPE_CHECKING:
+    from ..samples import RadianceSamples
+    from .sampling import Reflectance
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Capture:
     """`photographs`, N of (rows, columns).
 
-    directions: (N, 3), unit, towards each light; None where unknown. intensities: (N, 3) > 0, what each light sends,
-    relative; ones where not told. mask: (rows, columns) bool, where the object is. normals: (rows, columns, 3), unit on
-    the mask where the shape is known, else None. layout: how it was found. findings: what was not as it should be, and
-    what was done about it.
+    directions: (N, 3), unit, towards each light; None where unknown. intensities: (N, 3) > 0, the irradiance of each
+    light on a plane that faces it, relative; ones where not told. mask: (rows, columns) bool, where the object is.
+    normals: (rows, columns, 3), unit on the mask where the shape is known, else None. layout: how it was found.
+    findings: what was not as it should be, and what was done about it.
     """
 
     photographs: Photographs
@@ -58,6 +64,25 @@ class Capture:
             _require_shape("normals", normals, (*size, 3))
             require_unit(normals[mask], "normals on the mask")
             object.__setattr__(self, "normals", normals)
+
+    def reflectance(self, least: float = 0.0) -> Reflectance:
+        """f(wi, wo) at every pixel of the mask under every light, streamed: `sampling.Reflectance`.
+
+        least: in [0, 1), the part of a pixel's brightest photograph below which it counts as shadowed (MS 9: .05).
+        Raises `ArrayError` where lights or normals are unknown, `ParameterError` for another `least`.
+        """
+        from .sampling import Reflectance
+
+        return Reflectance(self, least)
+
+    def radiance(self) -> Iterator[RadianceSamples]:
+        """B(n, wo) at every pixel of the mask, whatever the light, a block for each photograph: `sampling.radiance`.
+
+        Raises `ArrayError` where normals are unknown.
+        """
+        from .sampling import radiance
+
+        return radiance(self)
 
     def mean(self) -> np.ndarray:
         """The mean of all photographs over their lights' intensities, (rows, columns, 3)."""

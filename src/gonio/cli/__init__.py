@@ -13,7 +13,7 @@ from typing import Any
 import typer
 
 from ..errors import GonioError
-from . import calibrate, convert, demo, info, normals, prefilter, render, sh
+from . import calibrate, convert, demo, info, normals, prefilter, render, sh, simulate
 
 Usage: Any = typer.BadParameter.__base__  # click's error for whatever is mistyped, which typer does not name
 
@@ -46,6 +46,7 @@ for verb in (
     convert.convert,
     calibrate.calibrate,
     normals.normals,
+    simulate.simulate,
     render.render,
     prefilter.prefilter,
     demo.demo,

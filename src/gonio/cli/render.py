@@ -60,7 +60,7 @@ def render(
     columns, rows = parse.size(size)
     material = parse.reflectance(brdf)
     arriving = None if maps_file and not light and not sun and not compare else _light(light, layout, orientation, sun)
-    scene, centre, radius = _shape(shape, relief, smooth, y_up)
+    scene, centre, radius = shape_of(shape, relief, smooth, y_up)
     towards = parse.vector(eye)
     camera = gn.Pinhole.look_at(
         eye=[c + radius * e for c, e in zip(centre, towards, strict=True)],
@@ -144,7 +144,7 @@ def shown(output: Path, image: Any, exposure: float, curve: Curve) -> Any:
     return gn.tone_map(image, curves[curve], exposure)
 
 
-def _shape(name: str, relief: float, smooth: bool, y_up: bool) -> tuple[Any, list[float], float]:
+def shape_of(name: str, relief: float, smooth: bool, y_up: bool) -> tuple[Any, list[float], float]:
     """The shape, and the centre and radius of a ball about it."""
     import numpy as np
 
