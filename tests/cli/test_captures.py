@@ -142,3 +142,13 @@ def test_a_simulated_folder_holds_the_truth_and_its_samples_are_the_brdf(capsys,
     code, _, err = run(capsys, "simulate", "-o", folder)
     assert code == 2
     assert "not empty" in err
+
+
+def test_ingested_photographs_give_the_same_normals(capsys, tmp_path, matte):
+    _, before, _ = run(capsys, "normals", matte, "-o", tmp_path / "a", "--json")
+    code, out, _ = run(capsys, "ingest", matte)
+    assert code == 0
+    assert "6 photographs in" in out
+    assert type(gn.read_capture(matte).photographs).__name__ == "StoredPhotographs"
+    _, after, _ = run(capsys, "normals", matte, "-o", tmp_path / "b", "--json")
+    assert before == after

@@ -68,7 +68,7 @@ class Capture:
     def reflectance(self, least: float = 0.0) -> Reflectance:
         """f(wi, wo) at every pixel of the mask under every light, streamed: `sampling.Reflectance`.
 
-        least: in [0, 1), the part of a pixel's brightest photograph below which it counts as shadowed (MS 9: .05).
+        least: in [0, 1), the part of a pixel's mean below which a photograph is left out (MS 9: .05).
         Raises `ArrayError` where lights or normals are unknown, `ParameterError` for another `least`.
         """
         from .sampling import Reflectance

@@ -34,6 +34,12 @@ class Photographs(ABC):
     def read(self, k: int) -> Photograph:
         """Photograph k, whole."""
 
+    def pixels(self, at: np.ndarray) -> Photograph:
+        """All photographs at pixels `at` (P,), counted along rows: radiance (N, P, 3) and clipped (N, P)."""
+        every = (self.read(k) for k in range(len(self)))
+        some = [(radiance.reshape(-1, 3)[at], clipped.reshape(-1)[at]) for radiance, clipped in every]
+        return Photograph(*(np.stack(parts) for parts in zip(*some, strict=True)))
+
     def __len__(self) -> int:
         return len(self.names)
 

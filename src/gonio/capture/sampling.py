@@ -4,7 +4,7 @@
     variance of f ~ 1 / (n.wi)^2      where all photographs are as noisy: so weight = (n.wi)^2
 
 Sites are pixels of the mask, counted along its rows. Left out are lights below the horizon, clipped pixels, and, as MS
-9 has it, what is darker than a part of the site's brightest photograph: shadow, as likely as not. f is in 1/sr where
+9 has it, what is darker than a part of the site's mean: noise or shadow, as likely as not. f is in 1/sr where
 intensities are irradiances and photographs radiances, and otherwise known up to one factor: that of a white target.
 
 The eye is straight above (an orthographic camera); near cameras and lights are not here.
@@ -41,7 +41,7 @@ class Slices:
 class Reflectance:
     """The reflectance samples of a capture: iterate for a block a photograph, or ask for all lights `at` some sites.
 
-    least: in [0, 1), the part of a site's brightest photograph below which it counts as shadowed (MS 9: .05).
+    least: in [0, 1), the part of a site's mean below which a photograph is left out (MS 9: .05).
     """
 
     capture: Capture
@@ -49,7 +49,7 @@ class Reflectance:
 
     def __post_init__(self) -> None:
         if not 0 <= self.least < 1:
-            raise ParameterError(f"least = {self.least}; a part of the brightest lies in [0, 1).")
+            raise ParameterError(f"least = {self.least}; a part of the mean lies in [0, 1).")
         if self.capture.directions is None:
             raise ArrayError("the capture's lights are unknown. Use radiance(), or give their directions.")
         _require_shape(self.capture)
@@ -66,12 +66,13 @@ class Reflectance:
 
     @cached_property
     def _dark(self) -> np.ndarray:
-        """Below which a site is shadowed, (sites,), of the mean of the channels."""
-        most = np.zeros(len(self))
+        """Below which a site is left out, (sites,), of the mean of the channels."""
+        total, count = np.zeros(len(self)), np.zeros(len(self))
         for k in range(len(self.capture.photographs)):
             values, known = self._photograph(k)
-            most = np.maximum(most, np.where(known, values.mean(axis=1), 0))
-        return self.least * most
+            total += np.where(known, values.mean(axis=1), 0)
+            count += known
+        return self.least * total / np.maximum(count, 1)
 
     def __iter__(self) -> Iterator[ReflectanceSamples]:
         """A block for each photograph that lights any site."""
@@ -88,7 +89,8 @@ class Reflectance:
                 yield ReflectanceSamples(np.flatnonzero(lit), wi[lit], wo[lit], f, cosine**2)
 
     def at(self, sites: np.ndarray) -> Slices:
-        """All lights at `sites` (S,), whole numbers below the length. Every photograph is read once for it.
+        """All lights at `sites` (S,), whole numbers below the length: quick from a store (`gonio ingest`), while files
+        are all decoded for it.
 
         Raises `MemoryLimitError` before more memory is taken than the limit.
         """
@@ -101,15 +103,16 @@ class Reflectance:
         wi = to_local(frames[:, None], capture.directions[None])
         wo = to_local(frames, _TO_EYE)
         value, weight = np.full((len(sites), count, 3), np.nan), np.zeros((len(sites), count))
-        dark = self._dark[sites] if self.least else None
-        for k in range(count):
-            values, known = self._photograph(k)
-            values, known = values[sites], known[sites]
-            lit = known & (wi[:, k, 2] > 0) & (wo[:, 2] > 0)
-            if dark is not None:
-                lit &= values.mean(axis=1) >= dark
-            value[lit, k] = values[lit] / wi[lit, k, 2:]
-            weight[lit, k] = wi[lit, k, 2] ** 2
+        radiance, clipped = capture.photographs.pixels(np.flatnonzero(capture.mask)[sites])
+        values = np.swapaxes(radiance / capture.intensities[:, None], 0, 1)
+        known = ~clipped.T
+        lit = known & (wi[..., 2] > 0) & (wo[:, None, 2] > 0)
+        if self.least:
+            bright = values.mean(axis=2)
+            mean = np.sum(np.where(known, bright, 0), axis=1) / np.maximum(known.sum(axis=1), 1)
+            lit &= bright >= self.least * mean[:, None]
+        value[lit] = values[lit] / wi[lit][:, 2:]
+        weight[lit] = wi[lit][:, 2] ** 2
         return Slices(wi, wo, value, weight)
 
     def _photograph(self, k: int) -> tuple[np.ndarray, np.ndarray]:

@@ -13,7 +13,7 @@ from typing import Any
 import typer
 
 from ..errors import GonioError
-from . import calibrate, convert, demo, info, normals, prefilter, render, sh, simulate
+from . import calibrate, convert, demo, info, ingest, normals, prefilter, render, sh, simulate
 
 Usage: Any = typer.BadParameter.__base__  # click's error for whatever is mistyped, which typer does not name
 
@@ -44,6 +44,7 @@ def gonio(
 for verb in (
     info.info,
     convert.convert,
+    ingest.ingest,
     calibrate.calibrate,
     normals.normals,
     simulate.simulate,

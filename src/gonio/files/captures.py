@@ -29,6 +29,7 @@ from .images import read_raster
 from .lp import read_lp
 from .photographs import PhotographFiles
 from .raster import Encoding
+from .store import stored
 from .whole import writing
 
 IMAGES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".tga", ".exr", ".hdr", ".pfm")
@@ -68,16 +69,12 @@ def read_capture(path: str | os.PathLike[str], encoding: Encoding | None = None,
     Raises `FileError` naming the file and what is wrong with it.
     """
     path = Path(path)
-    found = _layout(path)
-    if found.defects and not partial:
-        raise FileError(
-            f"{path}: "
-            + "; ".join(found.defects)
-            + f". Pass partial=True to take the {len(found.names)} that are sound."
-        )
-    if not found.names:
-        raise FileError(f"{path} has no photograph that can be read.")
-    photographs = PhotographFiles(found.folder, found.names, encoding if encoding is not None else found.encoding)
+    found = _sound(path, partial)
+    files = PhotographFiles(found.folder, found.names, encoding if encoding is not None else found.encoding)
+    store, why = stored(files)
+    if why:
+        found.notes.append(why)
+    photographs = files if store is None else store
     if photographs.assumed:
         warnings.warn(
             f"{path}: the photographs do not say how their codes stand for light; taken for sRGB. Say encoding='srgb' "
@@ -102,6 +99,12 @@ def read_capture(path: str | os.PathLike[str], encoding: Encoding | None = None,
         )
     except GonioError as error:
         raise FileError(f"{path}: {error}") from error
+
+
+def photograph_files(path: str | os.PathLike[str], *, partial: bool = False) -> PhotographFiles:
+    """The photographs of the capture that `read_capture` finds, as files. Raises as it does."""
+    found = _sound(Path(path), partial)
+    return PhotographFiles(found.folder, found.names, found.encoding)
 
 
 def write_capture(folder: str | os.PathLike[str], capture: Capture, names: Sequence[str] | None = None) -> Path:
@@ -131,6 +134,18 @@ def write_capture(folder: str | os.PathLike[str], capture: Capture, names: Seque
     with writing(path) as temporary:
         temporary.write_text("\n".join(lines) + "\n", "utf-8")
     return path
+
+
+def _sound(path: Path, partial: bool) -> _Found:
+    """What the layout says, where it is sound or may be partial."""
+    found = _layout(path)
+    if found.defects and not partial:
+        raise FileError(
+            f"{path}: {'; '.join(found.defects)}. Pass partial=True to take the {len(found.names)} that are sound."
+        )
+    if not found.names:
+        raise FileError(f"{path} has no photograph that can be read.")
+    return found
 
 
 def _layout(path: Path) -> _Found:

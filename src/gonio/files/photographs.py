@@ -16,14 +16,16 @@ from .raster import Encoding
 class PhotographFiles(Photographs):
     """Photographs at folder / names. encoding: as in `read_image`; where it is None, what a file states, or sRGB.
 
-    `assumed`: nothing states how their codes stand for light. Raises `FileError` where a file is no image, or they are
-    not of one size.
+    `stated`: what all files state of that; `assumed`: nothing does. Raises `FileError` where a file is no image, or
+    they are not of one size.
     """
 
     def __init__(self, folder: Path, names: Sequence[str], encoding: Encoding | None = None) -> None:
         self.folder, self.names, self.encoding = folder, tuple(names), encoding
         infos = [image_info(folder / name) for name in self.names]
         self.size = infos[0].rows, infos[0].columns
+        encodings = {info.encoding for info in infos}
+        self.stated = encodings.pop() if len(encodings) == 1 else None
         self.assumed = encoding is None and any(info.encoding is None for info in infos)
         for name, info in zip(self.names, infos, strict=True):
             if (info.rows, info.columns) != self.size:

@@ -1,0 +1,172 @@
+"""A capture's photographs decoded once, into a chunked and compressed Zarr store beside them: `capture.zarr`.
+
+    codes   (N, rows, columns, 3), as the files have them, in chunks of 32 photographs by 128 x 128 pixels: so both a
+            photograph and all lights of a few pixels are near each other. Zstandard, and a checksum for each chunk
+    attributes of codes: names, sizes and times of the files, encoding, done: how many photographs are whole
+
+Writing goes on where it was stopped. Memory is that of one chunk's photographs, whatever their number.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..capture.photographs import Photograph, Photographs
+from ..errors import FileError
+from .images import image_info, light, read_raster
+from .photographs import PhotographFiles
+from .raster import Encoding, Raster
+
+if TYPE_CHECKING:
+    import zarr
+
+STORE = "capture.zarr"
+
+_GROUP = 32  # photographs in a chunk
+_TILE = 128  # pixels each way
+
+
+class StoredPhotographs(Photographs):
+    """Photographs in a whole store. encoding: as in `read_image`; where None, what the files stated, or sRGB.
+
+    Raises `FileError` where the store is not whole, or not one of gonio's.
+    """
+
+    def __init__(self, path: Path, encoding: Encoding | None = None) -> None:
+        self.path, self.codes = path, _opened(path)
+        facts = dict(self.codes.attrs)
+        count, rows, columns, channels = self.codes.shape
+        names = facts.get("names")
+        if channels != 3 or not isinstance(names, list) or len(names) != count or facts.get("done") != count:
+            raise FileError(f"{path} is not whole: run gonio ingest again, which goes on where it was stopped.")
+        self.names, self.size = tuple(str(name) for name in names), (rows, columns)
+        stated: Any = facts.get("encoding")
+        self.assumed = encoding is None and stated is None
+        self.encoding = encoding if encoding is not None else stated
+        self._held: tuple[int, np.ndarray] | None = None
+
+    def read(self, k: int) -> Photograph:
+        group = k // _GROUP
+        if self._held is None or self._held[0] != group:
+            self._held = group, self._read((slice(group * _GROUP, (group + 1) * _GROUP), slice(None), slice(None)))
+        return self._photograph(self._held[1][k - group * _GROUP])
+
+    def pixels(self, at: np.ndarray) -> Photograph:
+        rows, columns = np.divmod(np.asarray(at), self.size[1])
+        radiance = np.empty((len(self.names), len(rows), 3), np.float32)
+        clipped = np.empty((len(self.names), len(rows)), bool)
+        tiles = (rows // _TILE) * (self.size[1] // _TILE + 1) + columns // _TILE
+        for tile in np.unique(tiles):
+            here = np.flatnonzero(tiles == tile)
+            top, left = rows[here[0]] // _TILE * _TILE, columns[here[0]] // _TILE * _TILE
+            some = self._read((slice(None), slice(top, top + _TILE), slice(left, left + _TILE)))
+            radiance[:, here], clipped[:, here] = self._photograph(some[:, rows[here] - top, columns[here] - left])
+        return Photograph(radiance, clipped)
+
+    def _read(self, where: tuple[slice, slice, slice]) -> np.ndarray:
+        try:
+            return np.asarray(self.codes[where])
+        except Exception as error:  # a codec's or a checksum's, of whatever kind
+            reason = " ".join(str(error).split())
+            raise FileError(f"{self.path} is damaged ({reason:.120}): delete it and run gonio ingest again.") from error
+
+    def _photograph(self, codes: np.ndarray) -> Photograph:
+        radiance = light(self.path, Raster(codes), "srgb" if self.encoding is None else self.encoding)
+        most = np.iinfo(codes.dtype).max if codes.dtype.kind == "u" else np.inf
+        return Photograph(radiance, np.logical_or.reduce(np.moveaxis(codes == most, -1, 0)))
+
+
+def ingest(files: PhotographFiles, path: Path, progress: Callable[[int, int], None] | None = None) -> None:
+    """Decode photographs into the store at `path`, or go on with one that was begun for the same files.
+
+    progress(done, total) hears of photographs. Raises `FileError` where another capture's store stands there, or files
+    have changed since it was begun.
+    """
+    codes = _begun(files, path)
+    count = len(files.names)
+    done = int(str(codes.attrs["done"]))
+    while done < count:
+        group = [read_raster(files.folder / name).samples for name in files.names[done : done + _GROUP]]
+        codes[done : done + len(group)] = np.stack([np.broadcast_to(samples, (*files.size, 3)) for samples in group])
+        done += len(group)
+        codes.attrs["done"] = done
+        if progress is not None:
+            progress(done, count)
+
+
+def stored(files: PhotographFiles) -> tuple[StoredPhotographs | None, str]:
+    """The store beside photographs where there is a whole one of them as they are now; otherwise None, and why."""
+    path = files.folder / STORE
+    if not path.is_dir():
+        return None, ""
+    try:
+        photographs = StoredPhotographs(path, files.encoding)
+    except FileError as error:
+        return None, str(error)
+    if dict(photographs.codes.attrs)["files"] != _stamps(files):
+        return None, f"{path} is of other photographs than stand beside it: not used. Run gonio ingest again."
+    return photographs, ""
+
+
+def _begun(files: PhotographFiles, path: Path) -> zarr.Array[Any]:
+    """The array to write to: a new one, or one that was begun for the same files."""
+    import zarr
+    from zarr.codecs import Crc32cCodec, ZstdCodec
+
+    if path.exists():
+        codes = _opened(path)
+        if codes.attrs.get("files") != _stamps(files):
+            raise FileError(f"{path} was begun for other photographs, or they have changed: move it away.")
+        return codes
+    first = read_raster(files.folder / files.names[0]).samples
+    rows, columns = files.size
+    count = len(files.names)
+    infos = {image_info(files.folder / name).dtype for name in files.names}
+    if len(infos) > 1:
+        raise FileError(f"{files.folder} mixes samples of {' and '.join(sorted(infos))}: convert them to one.")
+    with _writing(path):
+        return zarr.create_array(
+            str(path),
+            shape=(count, rows, columns, 3),
+            dtype=first.dtype,
+            chunks=(min(_GROUP, count), min(_TILE, rows), min(_TILE, columns), 3),
+            compressors=[ZstdCodec(level=1), Crc32cCodec()],
+            attributes={
+                "kind": "gonio photographs",
+                "version": 1,
+                "names": list(files.names),
+                "files": _stamps(files),
+                "encoding": files.stated,
+                "done": 0,
+            },
+        )
+
+
+def _opened(path: Path) -> zarr.Array[Any]:
+    import zarr
+
+    try:
+        codes = zarr.open_array(str(path), mode="r+")
+    except Exception as error:
+        raise FileError(f"{path} is no store of photographs: {' '.join(str(error).split()):.120}.") from error
+    if codes.attrs.get("kind") != "gonio photographs" or codes.attrs.get("version") != 1 or codes.ndim != 4:
+        raise FileError(f"{path} is no store of photographs that this version of gonio made.")
+    return codes
+
+
+def _stamps(files: PhotographFiles) -> list[list[int]]:
+    """Size and time of each file, by which a change is told."""
+    return [[stat.st_size, stat.st_mtime_ns] for stat in ((files.folder / name).stat() for name in files.names)]
+
+
+@contextlib.contextmanager
+def _writing(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise FileError(f"{path} cannot be written: {error.strerror or error}.") from error
