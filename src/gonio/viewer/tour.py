@@ -23,7 +23,10 @@ from ..brdf.model import BRDF
 from ..brdf.ndf import GGX
 from ..brdf.ward import Ward
 from ..cameras import Orthographic, Pinhole, look_at
-from ..directions import reflect
+from ..capture.integration import integrate_normals
+from ..capture.photometric_stereo import photometric_stereo
+from ..capture.simulation import Sensor, simulate
+from ..directions import from_spherical, reflect
 from ..errors import FileError
 from ..files.images import write_image
 from ..lights.environment import Environment
@@ -36,9 +39,11 @@ from ..rendering.reflection_map import degree_needed, reflection_map
 from ..rendering.shrm import prefilter
 from ..rendering.tonemap import Filmic, tone_map
 from ..shapes.analytic import Sphere
+from ..shapes.heightfield import HeightField
 from ..shapes.revolution import vase
 from ..sphere.grids import LatLong
 from ..sphere.zonal import phong
+from .captures import contact_sheet, relief_picture
 from .page import Page, Picture, Pictures, Section, Table, Text
 from .plots import lobes
 
@@ -69,7 +74,7 @@ def tour(folder: str | Path, progress: Callable[[int, int], None] | None = None)
         raise FileError(f"{folder}: cannot be made ({error.strerror}). Name another folder.") from error
     began = time.perf_counter()
     room = studio(128)
-    stops = (_hero, _materials, _nine_numbers, _reflection_map, _light_field)
+    stops = (_hero, _materials, _nine_numbers, _reflection_map, _light_field, _relief)
     sections = []
     for done, stop in enumerate(stops):
         if progress:
@@ -234,6 +239,39 @@ def _light_field(folder: Path, room: Environment) -> Section:
                 f"{100 * rms:.1f} %, in {1000 * quick:.0f} ms where the sum took {slow:.1f} s."
             ),
             Pictures(pictures, 220),
+        ),
+    )
+
+
+def _relief(folder: Path, _: Environment) -> Section:
+    y, x = np.mgrid[-1:1:160j, -1:1:160j]
+    heights = 9 * np.exp(-4 * ((x - 0.3) ** 2 + y**2)) + 2.5 * np.sin(6 * x) * np.cos(5 * y)
+    relief = HeightField(heights)
+    k = np.arange(20)
+    lights = from_spherical(np.radians(15 + 2.5 * k), 2.4 * k)
+    material = Lambert([0.5, 0.35, 0.2]) + Microfacet(GGX(0.3), Fresnel(1.5))
+    sensor = Sensor(exposure=1.2, gain=1e-4, read=1e-3, bits=8)
+    capture = simulate(relief, material, lights, relief.camera(), sensor=sensor, shadows=True)
+    found, taken = _timed(lambda: photometric_stereo(capture))
+    known = np.isfinite(found.error)
+    upright = np.where(known[..., None], found.normals, [0.0, 0.0, 1.0])
+    surface = integrate_normals(upright, known, np.where(known, 1 / found.error**2, 0))
+    cosine = np.sum(upright * np.asarray(capture.normals), axis=-1).clip(-1, 1)[known]
+    off = float(np.degrees(np.median(np.arccos(cosine))))
+    return Section(
+        "A relief from its shading",
+        (
+            Text(
+                f"A relief of glossy plastic, photographed from above under {len(k)} lights one after the other, with "
+                "shadows, noise, and codes of 8 bits. Photometric stereo finds its normals, a median of "
+                f"{off:.1f} degrees off where it foresaw {np.degrees(np.nanmedian(found.error)):.1f}, and from them "
+                f"heights, {float(np.nanstd(surface.heights - heights)):.2f} pixels off of {np.ptp(heights):.0f}; it "
+                f"took {taken:.1f} s."
+            ),
+            Pictures(
+                (Picture(contact_sheet(folder / "relief-photographs.png", capture), "Photographs, and lights."),), 700
+            ),
+            Pictures((Picture(relief_picture(folder / "relief.png", found, surface.heights), "What was found."),), 700),
         ),
     )
 
