@@ -41,6 +41,8 @@ from .directions import uvw as uvw
 from .errors import GonioError as GonioError
 from .errors import GonioWarning as GonioWarning
 from .files.brdfs import read_brdf as read_brdf
+from .files.camera_poses import read_cameras as read_cameras
+from .files.camera_poses import write_transforms as write_transforms
 from .files.captures import read_capture as read_capture
 from .files.captures import write_capture as write_capture
 from .files.cornell import read_cornell as read_cornell

@@ -58,6 +58,13 @@ def test_files_that_hold_no_fits_are_refused_by_name(tmp_path, materials, messag
         gn.read_merl_fits(written(tmp_path / "fits.json", materials))
 
 
+def test_files_too_large_to_be_fits_are_not_read(tmp_path):
+    with (tmp_path / "fits.json").open("wb") as file:
+        file.truncate(2**24 + 1)
+    with pytest.raises(gn.GonioError, match="more than 16777216 bytes"):
+        gn.read_merl_fits(tmp_path / "fits.json")
+
+
 def test_what_is_no_json_is_refused(tmp_path):
     (tmp_path / "fits.json").write_text("{")
     with pytest.raises(gn.GonioError, match="no JSON"):

@@ -43,11 +43,14 @@ def read_merl_fits(path: str | os.PathLike[str]) -> dict[str, ABC | ShiftedGamma
     no number, or outside its range.
     """
     try:
-        if Path(path).stat().st_size > _LARGEST:
-            raise FileError(f"{path} has more than {_LARGEST} bytes: no file of fits.")
-        materials = json.loads(Path(path).read_text("utf-8"))
+        size = Path(path).stat().st_size
+        text = Path(path).read_bytes() if size <= _LARGEST else b""
     except OSError as error:
         raise FileError(f"{path} cannot be read: {error.strerror or error}.") from error
+    if size > _LARGEST:
+        raise FileError(f"{path} has more than {_LARGEST} bytes: no file of fits.")
+    try:
+        materials = json.loads(text)
     except ValueError as error:
         raise FileError(f"{path} is no JSON: {error}.") from error
     if not isinstance(materials, dict) or not materials:
