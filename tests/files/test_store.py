@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
@@ -85,6 +87,24 @@ def test_what_is_no_store_is_refused(folder):
     (folder / store.STORE).mkdir()
     with pytest.raises(gn.GonioError, match="is no store of photographs"):
         store.ingest(photograph_files(folder), folder / store.STORE)
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("zarr_format", 2),
+        ("data_type", "object"),
+        ("codecs", [{"name": "bytes"}, {"name": "numcodecs.pickle"}]),
+        ("shape", [3, 2**20, 2**20, 3]),
+        ("attributes", {"kind": "other", "version": 1}),
+    ],
+)
+def test_stores_that_name_other_codecs_or_sizes_are_not_opened(folder, field, value):
+    store.ingest(photograph_files(folder), folder / store.STORE)
+    metadata = folder / store.STORE / "zarr.json"
+    metadata.write_text(json.dumps(json.loads(metadata.read_text()) | {field: value}))
+    with pytest.raises(gn.GonioError, match=r"no store of photographs|more than"):
+        store.StoredPhotographs(folder / store.STORE)
 
 
 def test_sixteen_bits_stay_sixteen(tmp_path):

@@ -10,9 +10,10 @@ Writing goes on where it was stopped. Memory is that of one chunk's photographs,
 from __future__ import annotations
 
 import contextlib
+import json
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -20,7 +21,7 @@ from ..capture.photographs import Photograph, Photographs
 from ..errors import FileError
 from .images import image_info, light, read_raster
 from .photographs import PhotographFiles
-from .raster import Encoding, Raster
+from .raster import Encoding, Raster, require_size
 
 if TYPE_CHECKING:
     import zarr
@@ -29,6 +30,7 @@ STORE = "capture.zarr"
 
 _GROUP = 32  # photographs in a chunk
 _TILE = 128  # pixels each way
+_LARGEST = 2**24  # bytes of metadata: some hundred thousand names
 
 
 class StoredPhotographs(Photographs):
@@ -119,7 +121,7 @@ def _begun(files: PhotographFiles, path: Path) -> zarr.Array[Any]:
     from zarr.codecs import Crc32cCodec, ZstdCodec
 
     if path.exists():
-        codes = _opened(path)
+        codes = _opened(path, "r+")
         if codes.attrs.get("files") != _stamps(files):
             raise FileError(f"{path} was begun for other photographs, or they have changed: move it away.")
         return codes
@@ -147,16 +149,36 @@ def _begun(files: PhotographFiles, path: Path) -> zarr.Array[Any]:
         )
 
 
-def _opened(path: Path) -> zarr.Array[Any]:
+def _opened(path: Path, mode: Literal["r", "r+"] = "r") -> zarr.Array[Any]:
     import zarr
 
+    _require_plain(path)
     try:
-        codes = zarr.open_array(str(path), mode="r+")
+        codes = zarr.open_array(str(path), mode=mode, zarr_format=3)
     except Exception as error:
         raise FileError(f"{path} is no store of photographs: {' '.join(str(error).split()):.120}.") from error
-    if codes.attrs.get("kind") != "gonio photographs" or codes.attrs.get("version") != 1 or codes.ndim != 4:
-        raise FileError(f"{path} is no store of photographs that this version of gonio made.")
+    require_size(path, *codes.shape[1:])
     return codes
+
+
+def _require_plain(path: Path) -> None:
+    """Raises `FileError` where metadata name anything but numbers and the codecs used here: some of Zarr's unpickle."""
+    try:
+        text = (path / "zarr.json").read_bytes()
+        facts = json.loads(text[:_LARGEST])
+        plain = (
+            facts["zarr_format"] == 3
+            and facts["node_type"] == "array"
+            and facts["attributes"]["kind"] == "gonio photographs"
+            and facts["attributes"]["version"] == 1
+            and facts["data_type"] in ("uint8", "uint16", "uint32", "float16", "float32")
+            and [codec["name"] for codec in facts["codecs"]] == ["bytes", "zstd", "crc32c"]
+            and len(facts["shape"]) == 4
+        )
+    except (OSError, ValueError, KeyError, TypeError):
+        plain = False
+    if not plain:
+        raise FileError(f"{path} is no store of photographs that this version of gonio made.")
 
 
 def _stamps(files: PhotographFiles) -> list[list[int]]:
