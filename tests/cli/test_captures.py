@@ -152,3 +152,15 @@ def test_ingested_photographs_give_the_same_normals(capsys, tmp_path, matte):
     assert type(gn.read_capture(matte).photographs).__name__ == "StoredPhotographs"
     _, after, _ = run(capsys, "normals", matte, "-o", tmp_path / "b", "--json")
     assert before == after
+
+
+def test_a_white_target_puts_albedo_in_its_units(capsys, tmp_path, matte):
+    white = tmp_path / "white"
+    white.mkdir()
+    for k, light in enumerate(lights()):
+        gn.write_image(white / f"white{k}.png", np.full((48, 48, 3), 0.5 * light[2]), "linear", bits=16)
+    code, _, _ = run(capsys, "normals", matte, "--white", white, "-o", tmp_path / "out")
+    assert code == 0
+    albedo = gn.read_layers(tmp_path / "out" / "relief.exr")["albedo"]
+    # 1/sr: the ball sends .8 of what the white, which is 1 / pi, sends .5 of.
+    assert np.nanmedian(albedo) == pytest.approx(0.8 / 0.5 / np.pi, rel=1e-3)

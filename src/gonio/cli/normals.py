@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from pathlib import Path
 
@@ -15,6 +16,7 @@ def normals(
     capture: Path = captures.FOLDER,
     output: Path = typer.Option(..., "--output", "-o", help="A folder for normals.png, relief.exr and relief.png."),
     lights: Path | None = typer.Option(None, "--lights", help="An .lp to use instead: its lights in the same order."),
+    white: Path | None = typer.Option(None, "--white", help="A capture of a flat white target under the same lights."),
     encoding: str = captures.ENCODING,
     partial: bool = captures.PARTIAL,
     plain: bool = typer.Option(False, "--plain", help="Least squares of all photographs, shadows and highlights too."),
@@ -28,6 +30,11 @@ def normals(
     from gonio.viewer.captures import relief_picture
 
     scene = captures.read(capture, encoding, partial, lights)
+    if white:
+        from gonio.capture.white import intensities_of_white
+
+        target = dataclasses.replace(captures.read(white, encoding, partial), directions=scene.directions)
+        scene = dataclasses.replace(scene, intensities=intensities_of_white(target))
     output.mkdir(parents=True, exist_ok=True)
     names = ("normals.png", "relief.exr", "relief.png")
     for name in names:
