@@ -2,10 +2,8 @@
 
 import numpy as np
 import pytest
-from reference import coupling as plain
 
 import gonio as gn
-from gonio._kernels import coupling as kernels
 from gonio.sphere.convolution import radiance, radiance_anisotropic, reflect, reflect_anisotropic
 from gonio.sphere.coupling import clebsch_gordan
 from gonio.sphere.harmonics import complex_from_real, complex_harmonics, harmonics
@@ -112,15 +110,6 @@ def test_products_of_wigner_functions_are_their_sums():
             if abs(m - s) <= j
         )
         close(total, first[l + m, l + q] * second[p - s, p - q])
-
-
-@pytest.mark.parametrize(("first", "second"), [(3, 3), (1, 3), (3, 1)])
-def test_the_kernel_sums_as_its_plain_twin(first, second, rng):
-    light, kappa = rng.normal(size=(2, first, 16)), rng.normal(size=(3, 3, 4, second))
-    weight = rng.normal(size=(3, 6, 36))
-    out = np.empty((36, 9, 3))
-    kernels.couple(light, kappa, weight, out)
-    close(out, plain.couple(light, kappa, weight))
 
 
 def test_anisotropic_maps_are_the_reflected_light_field(rng):
