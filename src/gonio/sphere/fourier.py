@@ -25,7 +25,10 @@ class Transforms:
         self.grid, self.degree = grid, degree
 
     def analyse(self, values: np.ndarray, weights: np.ndarray) -> np.ndarray:
-        """Tiles of values (rows, columns, C), times `weights` (2, pairs); the equator counts twice."""
+        """Tiles of values (rows, columns, C), times `weights` (2, pairs); the equator counts twice.
+
+        In memory that this thread's next transform uses again.
+        """
         channels = values.shape[2]
         image = np.ascontiguousarray(values).reshape(self.grid.rows, -1)
         tiles = scratch_tiles(self.degree + 1, 4 * channels, weights.shape[1], values.dtype)
