@@ -52,7 +52,7 @@ def add(image, polar, around, directions, least, lobe, out):  # type: ignore[no-
     rows, columns, channels = image.shape
     reach, scale = math.acos(least), (lobe.size - 2) / (1 - least)
     turn, height = columns / (2 * math.pi), math.pi / rows
-    sums, weights = np.empty(channels), np.empty(columns)
+    sums, own, weights = np.empty(channels), np.empty(channels), np.empty(columns)
     for i in range(directions.shape[0]):
         x, y, z = directions[i, 0], directions[i, 1], min(max(directions[i, 2], -1.0), 1.0)
         sine = math.sqrt(x * x + y * y)
@@ -72,16 +72,15 @@ def add(image, polar, around, directions, least, lobe, out):  # type: ignore[no-
                 count = min(max(math.floor(across + half - 0.5) - low + 1, 0), columns)
                 low %= columns
             ahead = min(count, columns - low)
-            before = sums.copy()
-            sums[:] = 0
+            own[:] = 0
             part = 0.0
             for start, stop in ((low, low + ahead), (0, count - ahead)):
                 some = weights[: stop - start]
                 part += _weigh(c, polar[1, r] * x, polar[1, r] * y, around[:, start:stop], scale, lobe, some)
-                _gather(some, image[r, start:stop], sums)
+                _gather(some, image[r, start:stop], own)
             total += polar[1, r] * part
             for k in range(channels):
-                sums[k] = before[k] + polar[1, r] * sums[k]
+                sums[k] += polar[1, r] * own[k]
         if total > 0:
             for k in range(channels):
                 out[i, k] = sums[k] / total

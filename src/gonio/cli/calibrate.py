@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 from pathlib import Path
 
@@ -39,14 +40,14 @@ def calibrate(
         names = gn.read_capture(of, "linear", partial=partial).photographs.names
         if len(names) != len(scene.photographs):
             raise FileError(f"{of} has {len(names)} photographs, {ball} has {len(scene.photographs)}.")
-    mean = scene.mean()
+    mean = functools.cache(scene.mean)  # reads every photograph: once, and only where it is wanted
     if circle:
         row, column, radius = parse.vector(circle)
         outline = mirror_ball.Circle((row, column), radius)
     elif not scene.mask.all():
         outline = mirror_ball.circle_of_mask(scene.mask)
     else:
-        outline = mirror_ball.find_circle(mean)
+        outline = mirror_ball.find_circle(mean())
     places = []
     for k, name in enumerate(scene.photographs.names):
         try:
@@ -59,7 +60,7 @@ def calibrate(
     if picture:
         from gonio.viewer.captures import ball_picture
 
-        ball_picture(picture, mean, outline, highlights, directions)
+        ball_picture(picture, mean(), outline, highlights, directions)
     if as_json:
         for name, direction in zip(names, directions.tolist(), strict=True):
             typer.echo(json.dumps({"photograph": name, "direction": direction}))

@@ -44,11 +44,9 @@ def normals(
     found = np.isfinite(relief.error) & (relief.normals[..., 2] > 0)
     if not found.any():
         raise gn.GonioError(f"{capture}: no pixel has a normal. Do the lights belong to these photographs?")
-    upright = np.where(found[..., None], relief.normals, [0.0, 0.0, 1.0])
     # What is known to a degree counts as a hundred of what is known to ten.
-    weights = np.where(found, 1 / (relief.error**2 + np.radians(0.1) ** 2), 0.0)
-    surface = gn.integrate_normals(upright, found, weights)
-    codes = np.where(found[..., None], 0.5 * upright + 0.5, 0.0)
+    surface = gn.integrate_normals(relief.normals, found, 1 / (relief.error**2 + np.radians(0.1) ** 2))
+    codes = np.where(found[..., None], 0.5 * relief.normals + 0.5, 0.0)
     gn.write_image(output / "normals.png", codes, "linear", bits=16, clip=True)
     layers = {"normals": relief.normals, "albedo": relief.albedo, "residual": relief.residual, "error": relief.error}
     gn.write_layers(output / "relief.exr", {**layers, "heights": surface.heights})

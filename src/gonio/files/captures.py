@@ -17,7 +17,7 @@ import os
 import re
 import tomllib
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -107,14 +107,14 @@ def photograph_files(path: str | os.PathLike[str], *, partial: bool = False) -> 
     return PhotographFiles(found.folder, found.names, found.encoding)
 
 
-def write_capture(folder: str | os.PathLike[str], capture: Capture, names: Sequence[str] | None = None) -> Path:
+def write_capture(folder: str | os.PathLike[str], capture: Capture) -> Path:
     """Write capture.toml beside photographs that lie in `folder` already: their names and lights. Answers its path.
 
-    names: of the photographs, relative to the folder; the capture's own where None. Whole or not at all.
+    Whole or not at all.
     """
     folder = Path(folder)
     lines = ["version = 1", "photographs = ["]
-    lines += [f"    {_quoted(name)}," for name in (capture.photographs.names if names is None else names)]
+    lines += [f"    {_quoted(name)}," for name in capture.photographs.names]
     lines.append("]")
     encoding = getattr(capture.photographs, "encoding", None)
     if encoding is not None:

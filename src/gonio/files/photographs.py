@@ -10,20 +10,21 @@ import numpy as np
 from ..capture.photographs import Photograph, Photographs
 from ..errors import FileError
 from .images import image_info, light, read_raster
-from .raster import Encoding
+from .raster import Encoding, Raster
 
 
 class PhotographFiles(Photographs):
     """Photographs at folder / names. encoding: as in `read_image`; where it is None, what a file states, or sRGB.
 
-    `stated`: what all files state of that; `assumed`: nothing does. Raises `FileError` where a file is no image, or
-    they are not of one size.
+    `stated`: what all files state of that; `assumed`: nothing does. `dtypes`: those of their samples. Raises
+    `FileError` where a file is no image, or they are not of one size.
     """
 
     def __init__(self, folder: Path, names: Sequence[str], encoding: Encoding | None = None) -> None:
         self.folder, self.names, self.encoding = folder, tuple(names), encoding
         infos = [image_info(folder / name) for name in self.names]
         self.size = infos[0].rows, infos[0].columns
+        self.dtypes = sorted({info.dtype for info in infos})
         encodings = {info.encoding for info in infos}
         self.stated = encodings.pop() if len(encodings) == 1 else None
         self.assumed = encoding is None and any(info.encoding is None for info in infos)
@@ -36,9 +37,13 @@ class PhotographFiles(Photographs):
 
     def read(self, k: int) -> Photograph:
         path = self.folder / self.names[k]
-        raster = read_raster(path)
-        chosen = self.encoding if self.encoding is not None else raster.encoding
-        radiance = light(path, raster, "srgb" if chosen is None else chosen)
-        codes = raster.samples.dtype.kind == "u"
-        clipped = raster.samples == (np.iinfo(raster.samples.dtype).max if codes else np.inf)
-        return Photograph(radiance, np.logical_or.reduce(np.moveaxis(clipped, -1, 0)))
+        return photograph(path, read_raster(path), self.encoding)
+
+
+def photograph(path: Path, raster: Raster, encoding: Encoding | None) -> Photograph:
+    """What the samples (..., C) of a file tell. Encoded as `encoding` says, or as the file does, or in sRGB."""
+    chosen = encoding if encoding is not None else raster.encoding
+    radiance = light(path, raster, "srgb" if chosen is None else chosen)
+    dtype = raster.samples.dtype
+    clipped = raster.samples == (np.iinfo(dtype).max if dtype.kind == "u" else np.inf)
+    return Photograph(radiance, np.logical_or.reduce(np.moveaxis(clipped, -1, 0)))

@@ -9,9 +9,8 @@ Writing goes on where it was stopped. Memory is that of one chunk's photographs,
 
 from __future__ import annotations
 
-import contextlib
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -19,8 +18,8 @@ import numpy as np
 
 from ..capture.photographs import Photograph, Photographs
 from ..errors import FileError
-from .images import image_info, light, read_raster
-from .photographs import PhotographFiles
+from .images import read_raster
+from .photographs import PhotographFiles, photograph
 from .raster import Encoding, Raster, require_size
 
 if TYPE_CHECKING:
@@ -78,9 +77,7 @@ class StoredPhotographs(Photographs):
             raise FileError(f"{self.path} is damaged ({reason:.120}): delete it and run gonio ingest again.") from error
 
     def _photograph(self, codes: np.ndarray) -> Photograph:
-        radiance = light(self.path, Raster(codes), "srgb" if self.encoding is None else self.encoding)
-        most = np.iinfo(codes.dtype).max if codes.dtype.kind == "u" else np.inf
-        return Photograph(radiance, np.logical_or.reduce(np.moveaxis(codes == most, -1, 0)))
+        return photograph(self.path, Raster(codes), self.encoding)
 
 
 def ingest(files: PhotographFiles, path: Path, progress: Callable[[int, int], None] | None = None) -> None:
@@ -128,10 +125,9 @@ def _begun(files: PhotographFiles, path: Path) -> zarr.Array[Any]:
     first = read_raster(files.folder / files.names[0]).samples
     rows, columns = files.size
     count = len(files.names)
-    infos = {image_info(files.folder / name).dtype for name in files.names}
-    if len(infos) > 1:
-        raise FileError(f"{files.folder} mixes samples of {' and '.join(sorted(infos))}: convert them to one.")
-    with _writing(path):
+    if len(files.dtypes) > 1:
+        raise FileError(f"{files.folder} mixes samples of {' and '.join(files.dtypes)}: convert them to one.")
+    try:
         return zarr.create_array(
             str(path),
             shape=(count, rows, columns, 3),
@@ -147,6 +143,8 @@ def _begun(files: PhotographFiles, path: Path) -> zarr.Array[Any]:
                 "done": 0,
             },
         )
+    except OSError as error:
+        raise FileError(f"{path} cannot be written: {error.strerror or error}.") from error
 
 
 def _opened(path: Path, mode: Literal["r", "r+"] = "r") -> zarr.Array[Any]:
@@ -184,11 +182,3 @@ def _require_plain(path: Path) -> None:
 def _stamps(files: PhotographFiles) -> list[list[int]]:
     """Size and time of each file, by which a change is told."""
     return [[stat.st_size, stat.st_mtime_ns] for stat in ((files.folder / name).stat() for name in files.names)]
-
-
-@contextlib.contextmanager
-def _writing(path: Path) -> Iterator[None]:
-    try:
-        yield
-    except OSError as error:
-        raise FileError(f"{path} cannot be written: {error.strerror or error}.") from error

@@ -23,10 +23,9 @@ order k of the light in the surface's frame, and no transform over rotations:
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -62,7 +61,7 @@ def world_coefficients(light: Array, transfer: Array) -> Array:
         return real
     L = xp.concat((L, xp.zeros_like(L[:1, :])), axis=0)
     kappa = xp.reshape(kappa, (-1, kappa.shape[-1]))
-    kappa_at, light_at = (xp.asarray(x, device=light.device) for x in (coupling.kappa_at, coupling.light_at))
+    light_at, kappa_at = (xp.asarray(x, device=light.device) for x in _places(degree, exit_degree))
     weight = like(coupling.weight, light)[..., None]
     coefficients: Any = 0.0
     for i in range(exit_degree + 1):
@@ -127,14 +126,11 @@ def _fitting(light: Array, transfer: Array) -> tuple[Any, Array, Array]:
     return xp, light, transfer[: degree + 1, ...]
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class _Coupling:
-    """For each term i of the sum over l (j = l + p - 2 i), each p, s >= 0 and each j, M: where L and kappa stand, and
+class _Coupling(NamedTuple):
+    """What L kappa counts in c_jM, for each term i of the sum over l (j = l + p - 2 i), each p, s >= 0 and each j, M:
     <l M+s p -s | j M>, times sqrt2 where s > 0. So Re and -Im of the sums are the real B_ps and B_p,-s, whose signs
     (-1)^s cancel those of c_jM. `kappa` (p, i, l, q): what rho_lpq counts in kappa_lpj."""
 
-    light_at: np.ndarray
-    kappa_at: np.ndarray
     weight: np.ndarray
     kappa: np.ndarray
 
@@ -150,19 +146,35 @@ def _coupling(degree: int, exit_degree: int, highest: int, dtype: str) -> _Coupl
             both = np.where(q > 0, 2.0, 1.0) * (-1.0) ** q * clebsch_gordan(l, q, p, -q, j)
             kappa[p, i] = both * np.sqrt(4 * math.pi / (2 * np.maximum(j, 0) + 1))
     j, M = degrees_and_orders(degree + exit_degree)
-    sets = [(p, s) for p in range(exit_degree + 1) for s in range(p + 1)]
-    shape = exit_degree + 1, len(sets), j.size
-    light_at, kappa_at = np.full(shape, (degree + 1) ** 2), np.zeros(shape, np.int64)
-    weight = np.zeros(shape)
+    sets = _sets(exit_degree)
+    weight = np.zeros((exit_degree + 1, len(sets), j.size))
     for k, (p, s) in enumerate(sets):
         for i in range(p + 1):
             l = j - p + 2 * i
-            m = M + s
-            exists = (l >= 0) & (l <= degree) & (np.abs(m) <= l)
-            light_at[i, k] = np.where(exists, l * (l + 1) + m, (degree + 1) ** 2)
+            coefficient = clebsch_gordan(l, M + s, p, np.array(-s), j)  # 0 where there is none
+            weight[i, k] = np.where(l <= degree, coefficient, 0) * (math.sqrt(2) if s else 1)
+    return _Coupling(weight.astype(dtype), kappa)
+
+
+@lru_cache(maxsize=8)
+def _places(degree: int, exit_degree: int) -> tuple[np.ndarray, np.ndarray]:
+    """Where L and kappa of each weight stand, for array code, which takes them by index; beyond L's last is none."""
+    j, M = degrees_and_orders(degree + exit_degree)
+    sets = _sets(exit_degree)
+    shape = exit_degree + 1, len(sets), j.size
+    light_at, kappa_at = np.full(shape, (degree + 1) ** 2), np.zeros(shape, np.int64)
+    for k, (p, s) in enumerate(sets):
+        for i in range(p + 1):
+            l = j - p + 2 * i
+            exists = (l >= 0) & (l <= degree) & (np.abs(M + s) <= l)
+            light_at[i, k] = np.where(exists, l * (l + 1) + M + s, (degree + 1) ** 2)
             kappa_at[i, k] = (p * (exit_degree + 1) + i) * (degree + 1) + np.clip(l, 0, degree)
-            weight[i, k] = np.where(exists, clebsch_gordan(l, m, p, np.array(-s), j), 0) * (math.sqrt(2) if s else 1)
-    return _Coupling(light_at, kappa_at, weight.astype(dtype), kappa)
+    return light_at, kappa_at
+
+
+def _sets(exit_degree: int) -> list[tuple[int, int]]:
+    """p and s >= 0, in the order of the weights."""
+    return [(p, s) for p in range(exit_degree + 1) for s in range(p + 1)]
 
 
 def _real(xp: Any, coefficients: Array, exit_degree: int) -> Array:
@@ -180,8 +192,7 @@ def _real(xp: Any, coefficients: Array, exit_degree: int) -> Array:
     real = xp.where(ahead, xp.real(both), -xp.take(xp.imag(both), mirror, axis=1)) * norm
     imaginary = xp.where(ahead, xp.imag(less), xp.take(xp.real(less), mirror, axis=1)) * norm
     parts: list[Any] = [None] * (exit_degree + 1) ** 2
-    sets = [(p, s) for p in range(exit_degree + 1) for s in range(p + 1)]
-    for k, (p, s) in enumerate(sets):
+    for k, (p, s) in enumerate(_sets(exit_degree)):
         parts[p * (p + 1) + s] = real[k, ...]
         if s:
             parts[p * (p + 1) - s] = -imaginary[k, ...]

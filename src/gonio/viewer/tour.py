@@ -254,9 +254,8 @@ def _relief(folder: Path, _: Environment) -> Section:
     capture = simulate(relief, material, lights, relief.camera(), sensor=sensor, shadows=True)
     found, taken = _timed(lambda: photometric_stereo(capture))
     known = np.isfinite(found.error)
-    upright = np.where(known[..., None], found.normals, [0.0, 0.0, 1.0])
-    surface = integrate_normals(upright, known, np.where(known, 1 / found.error**2, 0))
-    cosine = np.sum(upright * np.asarray(capture.normals), axis=-1).clip(-1, 1)[known]
+    surface = integrate_normals(found.normals, known, 1 / found.error**2)
+    cosine = np.sum(found.normals * np.asarray(capture.normals), axis=-1).clip(-1, 1)[known]
     off = float(np.degrees(np.median(np.arccos(cosine))))
     return Section(
         "A relief from its shading",
