@@ -141,7 +141,8 @@ def _sound(path: Path, partial: bool) -> _Found:
     found = _layout(path)
     if found.defects and not partial:
         raise FileError(
-            f"{path}: {'; '.join(found.defects)}. Pass partial=True to take the {len(found.names)} that are sound."
+            f"{path}: {'; '.join(found.defects)}. Pass partial=True (--partial) to take the {len(found.names)} that "
+            "are sound."
         )
     if not found.names:
         raise FileError(f"{path} has no photograph that can be read.")
