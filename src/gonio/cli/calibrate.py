@@ -25,7 +25,7 @@ def calibrate(
     import numpy as np
 
     import gonio as gn
-    from gonio.capture import mirror_ball
+    from gonio.capture import circles, mirror_ball
     from gonio.errors import ArrayError, FileError
     from gonio.files.whole import writable
 
@@ -43,11 +43,11 @@ def calibrate(
     mean = functools.cache(scene.mean)  # reads every photograph: once, and only where it is wanted
     if circle:
         row, column, radius = parse.vector(circle)
-        outline = mirror_ball.Circle((row, column), radius)
+        outline = circles.Circle((row, column), radius)
     elif not scene.mask.all():
-        outline = mirror_ball.circle_of_mask(scene.mask)
+        outline = circles.circle_of_mask(scene.mask)
     else:
-        outline = mirror_ball.find_circle(mean())
+        outline = circles.find_circle(mean())
     places = []
     for k, name in enumerate(scene.photographs.names):
         try:
