@@ -3,7 +3,7 @@
     X = E t = exp g(Z)                                                    Z code, X exposure, E radiance, t seconds
     min over g, ln E of  sum w(Z)^2 (g(Z) - ln E - ln t)^2 + lambda sum_z w(z)^2 g''(z)^2        recover_response
     E = sum_k E_k / v_k  /  sum_k 1 / v_k,   E_k = X_k / t_k,   v_k = (gain X + read^2) / t_k^2  merge
-    variance of X = gain X + read^2                                       noise_of
+    variance of X = gain X + read^2                                       noise_of; CodedNoise adds (dX/dZ)^2 / 12
     white = exp(a_0 + a_1 r^2 + a_2 r^4 + a_3 r^6) (1 + b.x)             flat_field
 
 The response is Debevec and Malik's (1997), with their hat w, 1 at the middle of the codes and 0 at both ends, and the
@@ -134,6 +134,31 @@ class Noise:
         """Variance of what is counted where `exposure` is expected, any shape."""
         # Never less than that of one electron: an exposure of zero or below would weigh infinitely without read noise.
         return np.asarray(self.gain * np.maximum(exposure, self.gain) + self.read**2)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class CodedNoise(Noise):
+    """`Noise` of codes (rows, columns, C): rounding adds a twelfth of the square of what a code spans by `response`."""
+
+    response: Response = dataclasses.field(kw_only=True)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        g, step = self.response.log_exposure, self.response.step
+        thin = max(1, len(g) // _LEVELS)
+        x = np.exp(g[::thin])
+        span = np.gradient(x, axis=0) / (thin * step)
+        at = np.linspace(0, 1, _LEVELS) ** 2  # exposures of the table: curves of cameras are near a square root
+        table = [np.interp(at, *curve) for curve in zip(x.T, (span**2 / 12).T, strict=True)]
+        object.__setattr__(self, "_rounding", np.stack(table, axis=-1))
+
+    def variance(self, exposure: np.ndarray) -> np.ndarray:
+        table: np.ndarray = self.__dict__["_rounding"]
+        place = np.minimum(np.sqrt(np.maximum(exposure, 0)) * (_LEVELS - 1) + 0.5, _LEVELS - 1).astype(np.intp)
+        variance = super().variance(exposure)
+        for c in range(exposure.shape[-1]):
+            variance[..., c] += table[place[..., c], c % table.shape[1]]
+        return variance
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -371,7 +396,8 @@ def _chosen(z: np.ndarray, log_time: np.ndarray, levels: int, name: str) -> np.n
     # The brightest level that occurs is where a sensor clips that does not reach its last code.
     known = (z > 0) & (z < min(z.max(), levels - 1))
     first, last = known.argmax(axis=0), len(z) - 1 - known[::-1].argmax(axis=0)
-    z, known = (x[:, log_time[last] > log_time[first]] for x in (z, known))
+    telling = known.any(axis=0) & (log_time[last] > log_time[first])
+    z, known = z[:, telling], known[:, telling]
     covered = np.unique(z[known] * 32 // levels).size / 32
     if covered < _COVERED:
         raise ArrayError(

@@ -36,8 +36,11 @@ class PhotographFiles(Photographs):
                 )
 
     def read(self, k: int) -> Photograph:
-        path = self.folder / self.names[k]
-        return photograph(path, read_raster(path), self.encoding)
+        return photograph(self.folder / self.names[k], self.raster(k), self.encoding)
+
+    def raster(self, k: int) -> Raster:
+        """The samples of photograph k as its file has them."""
+        return read_raster(self.folder / self.names[k])
 
 
 def photograph(path: Path, raster: Raster, encoding: Encoding | None) -> Photograph:
