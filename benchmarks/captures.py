@@ -34,7 +34,7 @@ def stereo(repetitions: int) -> None:
     lights = gn.normalise(rng.normal(size=(96, 3)) * np.array([0.6, 0.6, 0.3]) + np.array([0, 0, 1]))
     normals = gn.normalise(rng.normal(size=(612, 512, 3)) * np.array([0.3, 0.3, 0.2]) + np.array([0, 0, 1]))
     images = np.maximum(np.einsum("rci,ki->krc", normals, lights), 0) + rng.normal(size=(96, 612, 512)) * 0.01
-    capture = gn.Capture(Held(np.repeat(images[..., None], 3, axis=3).astype(np.float32)), lights)
+    capture = gn.Capture(Held(np.repeat(images[..., None], 3, axis=3).astype(np.float32)), gn.distant_lights(lights))
     works = {
         "robust": lambda: gn.photometric_stereo(capture),
         "least squares": lambda: gn.photometric_stereo(capture, robust=False),

@@ -9,7 +9,7 @@ relief = gn.HeightField(8 * np.exp(-4 * ((x - 0.3) ** 2 + y**2)) + 2 * np.sin(6 
 plastic = gn.Lambert([0.5, 0.35, 0.2]) + gn.Microfacet(gn.GGX(0.3), gn.Fresnel(1.5))
 
 k = np.arange(20)
-lights = gn.from_spherical(np.radians(15 + 2.5 * k), 2.4 * k)
+lights = gn.distant_lights(gn.from_spherical(np.radians(15 + 2.5 * k), 2.4 * k), np.full(20, np.pi))
 sensor = gn.Sensor(exposure=1.2, gain=1e-4, read=1e-3, bits=8)
 capture = gn.simulate(relief, plastic, lights, relief.camera(), sensor=sensor, shadows=True)
 

@@ -25,10 +25,14 @@ from .cameras import Orthographic as Orthographic
 from .cameras import Pinhole as Pinhole
 from .cameras import look_at as look_at
 from .capture.integration import integrate_normals as integrate_normals
+from .capture.lighting import distant_lights as distant_lights
+from .capture.lighting import near_lights as near_lights
 from .capture.model import Capture as Capture
 from .capture.photometric_stereo import photometric_stereo as photometric_stereo
 from .capture.simulation import Sensor as Sensor
 from .capture.simulation import simulate as simulate
+from .capture.simulation import simulate_turntable as simulate_turntable
+from .capture.turntable import Turntable as Turntable
 from .directions import from_half_difference as from_half_difference
 from .directions import from_spherical as from_spherical
 from .directions import from_uvw as from_uvw
@@ -42,9 +46,8 @@ from .errors import GonioError as GonioError
 from .errors import GonioWarning as GonioWarning
 from .files.brdfs import read_brdf as read_brdf
 from .files.camera_poses import read_cameras as read_cameras
-from .files.camera_poses import write_transforms as write_transforms
+from .files.capture_toml import write_capture as write_capture
 from .files.captures import read_capture as read_capture
-from .files.captures import write_capture as write_capture
 from .files.cornell import read_cornell as read_cornell
 from .files.engine_harmonics import Engine as Engine
 from .files.engine_harmonics import from_engine as from_engine
@@ -69,9 +72,11 @@ from .files.merl import read_merl as read_merl
 from .files.merl import write_merl as write_merl
 from .files.merl_fits import read_merl_fits as read_merl_fits
 from .files.meshes import read_mesh as read_mesh
+from .files.meshes import write_mesh as write_mesh
 from .files.rgl import read_rgl as read_rgl
 from .files.shrm import read_shrm as read_shrm
 from .files.shrm import write_shrm as write_shrm
+from .files.transforms import write_transforms as write_transforms
 from .frames import euler as euler
 from .frames import euler_angles as euler_angles
 from .frames import frame as frame

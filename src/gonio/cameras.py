@@ -135,6 +135,10 @@ class Camera(ABC):
         Pixels may lie outside the image. They are NaN where the camera cannot see in that direction at all.
         """
 
+    @abstractmethod
+    def towards(self, points: Array) -> np.ndarray:
+        """The vectors (..., 3) from world `points` (..., 3) to the eye; to its plane, where rays are parallel."""
+
     def _in_camera(self, points: Array) -> np.ndarray:
         points = to_numpy(points).astype(np.float64, copy=False)
         if points.ndim == 0 or points.shape[-1] != 3:
@@ -171,6 +175,9 @@ class Orthographic(Camera):
         local = self._in_camera(points)
         rows, columns = self.size
         return local[..., :2] / self.pixel + (columns / 2, rows / 2), local[..., 2]
+
+    def towards(self, points: Array) -> np.ndarray:
+        return np.asarray(-self._in_camera(points)[..., 2:] * self.forward)
 
 
 @dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
@@ -236,6 +243,9 @@ class Pinhole(Camera):
             seen = (np.sum(plane**2, axis=-1) < self._fold()) & (self._slope(plane)[3] > 0)
             plane = np.where(seen[..., None], self._distorted(plane), np.nan)
         return plane * (self.fx, self.fy) + (self.cx, self.cy), depth
+
+    def towards(self, points: Array) -> np.ndarray:
+        return np.asarray(-self._in_camera(points) @ self.pose[:3, :3].T)
 
     def _distorted(self, plane: np.ndarray) -> np.ndarray:
         k1, k2, p1, p2, k3 = self.distortion

@@ -21,11 +21,12 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
+from scipy import ndimage
 
 from .arrays import Array, floats, is_numpy, like, namespace, require_finite, to_numpy
 from .brdf.model import BRDF, Parametric
 from .directions import dot, require_unit
-from .errors import ArrayError
+from .errors import ArrayError, ParameterError
 from .frames import require_rotation
 from .lights.model import Beams, Light
 
@@ -117,6 +118,30 @@ def varied(model: Model, change: Callable[[Array, int], Array]) -> Model:
         if new is not value:
             changed[field.name] = new
     return dataclasses.replace(model, **changed) if changed else model  # type: ignore[type-var]
+
+
+def textured(model: Model, uv: Array | None) -> Model:
+    """`model` at N sites with texture coordinates `uv` (N, 2): parameters that vary over two axes are textures.
+
+    A texture is (rows, columns), or (rows, columns, C) of a colour, row 0 at v = 1; between texels' centres it is
+    bilinear, beyond the outermost constant. Raises `ParameterError` for a parameter that varies over other axes, or
+    where there is no uv to look it up by.
+    """
+
+    def looked_up(value: Array, axes: int) -> np.ndarray:
+        texture = to_numpy(value)
+        if axes != 2:
+            raise ParameterError(f"a parameter of shape {texture.shape} is neither one value nor a texture (v, u).")
+        if uv is None:
+            raise ParameterError("the material has textures, but the shape no uv to look them up by.")
+        rows, columns = texture.shape[:2]
+        u, v = to_numpy(uv).T
+        place = np.stack(((1 - v) * rows - 0.5, u * columns - 0.5))
+        layers = np.moveaxis(texture.reshape(rows, columns, -1), -1, 0)
+        found = [ndimage.map_coordinates(layer, place, order=1, mode="nearest") for layer in layers]
+        return np.stack(found, axis=-1).reshape(-1, *texture.shape[2:])
+
+    return varied(model, looked_up)
 
 
 def processors() -> int:

@@ -134,7 +134,8 @@ def test_a_simulated_folder_holds_the_truth_and_its_samples_are_the_brdf(capsys,
     off = np.degrees(np.arccos(np.sum(capture.directions * truth, axis=1).clip(-1, 1)))
     assert 0.2 < np.sqrt(np.mean(off**2)) < 2
     model = gn.Lambert([0.5, 0.4, 0.3]) + gn.Microfacet(gn.GGX(0.4), gn.Fresnel(1.5))
-    capture = dataclasses.replace(capture, directions=truth)
+    strengths = [light.irradiance for light in capture.lights]
+    capture = dataclasses.replace(capture, lights=gn.distant_lights(truth, strengths))
     for block in capture.reflectance():
         steep = block.wi[:, 2] > 0.2
         # Normals and codes are rounded to 16 bits.

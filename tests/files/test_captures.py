@@ -149,7 +149,7 @@ def test_a_diligent_folder_opens(tmp_path):
     (tmp_path / "light_intensities.txt").write_text("1 2 3\n2 2 2\n1 1 1\n")
     capture = gn.read_capture(tmp_path)
     assert capture.layout == "DiLiGenT"
-    assert_allclose(capture.intensities[0], [1, 2, 3])
+    assert_allclose(capture.lights[0].irradiance, [1, 2, 3])
     # 16 bits, linear: to half a code.
     assert_allclose(capture.photographs.read(1).radiance, 0.5, atol=1e-5)
     (tmp_path / "light_intensities.txt").write_text("1 2 3\n2 2 2\n")

@@ -1,5 +1,6 @@
 """Photometric stereo of one pixel after the other: the loops of `capture/photometric_stereo.py`.
 
+lights (1 or pixels, 3, N): their directions, at every pixel where they are near
 values (pixels, N): what each light made of a pixel, NaN where that is not known
 g (pixels, 3) = albedo n: least squares over the lights that count, those with `counts` (pixels, N) = 1
 """
@@ -21,26 +22,34 @@ _FAST = {"reassoc", "contract", "nsz"}
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def gather(radiance, clipped, at, scale, values):  # type: ignore[no-untyped-def]
-    """`values` (pixels,): the sum of radiance (all, 3) times scale (3,) at pixels `at`, NaN where clipped (all,)."""
-    for i in range(at.size):
-        p = at[i]
-        value = radiance[p, 0] * scale[0] + radiance[p, 1] * scale[1] + radiance[p, 2] * scale[2]
-        values[i] = np.nan if clipped[p] else value
+def gather(radiance, clipped, low, scale, values):  # type: ignore[no-untyped-def]
+    """`values`: radiance (N, all, 3) times scale (N, 3), summed, of pixels from `low` on; NaN if clipped (N, all)."""
+    for k in range(scale.shape[0]):
+        for i in range(values.shape[0]):
+            p = low + i
+            value = radiance[k, p, 0] * scale[k, 0] + radiance[k, p, 1] * scale[k, 1] + radiance[k, p, 2] * scale[k, 2]
+            values[i, k] = np.nan if clipped[k, p] else value
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def accumulate(radiance, at, scale, g, light, counts, top, bottom):  # type: ignore[no-untyped-def]
-    """Add to top (pixels, 3) and bottom (pixels,) what one photograph says of albedo: g.l times value, g.l squared.
-
-    g (pixels, 3), light (3,); counts (pixels,): whether the photograph counts there.
-    """
-    for i in range(at.size):
-        if counts[i]:
-            p, cosine = at[i], light[0] * g[i, 0] + light[1] * g[i, 1] + light[2] * g[i, 2]
-            for c in range(3):
-                top[i, c] += cosine * scale[c] * radiance[p, c]
-            bottom[i] += cosine * cosine
+def colour(radiance, low, scale, lights, g, counts, albedo):  # type: ignore[no-untyped-def]
+    """`albedo` (pixels, 3), of pixels from `low` on: least squares of radiance (N, all, 3) times scale (N, 3) over the
+    photographs that count, counts (pixels, N)."""
+    pixels, n = counts.shape
+    bottom, last = np.zeros(pixels), lights.shape[0] - 1
+    albedo[:] = 0.0
+    for k in range(n):
+        for i in range(pixels):
+            if counts[i, k]:
+                j = min(i, last)
+                cosine = lights[j, 0, k] * g[i, 0] + lights[j, 1, k] * g[i, 1] + lights[j, 2, k] * g[i, 2]
+                for c in range(3):
+                    albedo[i, c] += cosine * scale[k, c] * radiance[k, low + i, c]
+                bottom[i] += cosine * cosine
+    for i in range(pixels):
+        length = _length(g[i])
+        for c in range(3):
+            albedo[i, c] = albedo[i, c] * length / bottom[i] if bottom[i] > 0 else np.nan
 
 
 @njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
@@ -106,38 +115,39 @@ def _choose(row, known, expected, length, robust, sizes, weights):  # type: igno
 def solve(values, lights, robust, found, counts, residual, error):  # type: ignore[no-untyped-def]
     """Fill `found` (pixels, 3), `counts`, and for each pixel the rms `residual` and the standard `error` of n, radians.
 
-    lights (3, N). All lights count that are known and that g does not face away from; on the way, also those that it
+    All lights count that are known and that g does not face away from; on the way, also those that it
     faces away from and yet sees, since g is wrong then. Robust: first the sum of absolute residuals is brought down, by
     weights 1 / residual; then those count that lie within three standard deviations of it, by the median. A pixel that
     fewer than three lights tell about, or lights in a plane, gets NaN.
     """
     pixels, n = values.shape
     row, known, weights, sizes, expected = np.empty(n), np.empty(n), np.empty(n), np.empty(n), np.empty(n)
-    g, inverse = np.empty(3), np.empty((3, 3))
+    g, inverse, last = np.empty(3), np.empty((3, 3)), lights.shape[0] - 1
     for i in range(pixels):
+        own = lights[min(i, last)]
         for k in range(n):
             blind = math.isnan(values[i, k])
             known[k], row[k] = (0.0, 0.0) if blind else (1.0, values[i, k])
-        good = _solve(row, lights, known, g, inverse)
+        good = _solve(row, own, known, g, inverse)
         rounds = 0
         while good and rounds < ROUNDS:
             length, x, y, z = _length(g), g[0], g[1], g[2]
-            _expect(lights, g, expected)
+            _expect(own, g, expected)
             _reweigh(row, known, expected, _DARK * length, _CLOSE * length, robust, weights)
-            good = _solve(row, lights, weights, g, inverse)
+            good = _solve(row, own, weights, g, inverse)
             rounds += 1
             if abs(g[0] - x) + abs(g[1] - y) + abs(g[2] - z) <= _CLOSE * length:
                 break
         if good:
-            _expect(lights, g, expected)
+            _expect(own, g, expected)
             _choose(row, known, expected, _length(g), robust, sizes, weights)
-            good = _solve(row, lights, weights, g, inverse)
+            good = _solve(row, own, weights, g, inverse)
         length = _length(g) if good else 0.0
         if not length > 0:
             found[i], counts[i], residual[i], error[i] = np.nan, 0, np.nan, np.nan
             continue
         found[i] = g
-        _expect(lights, g, expected)
+        _expect(own, g, expected)
         total, used = 0.0, 0
         for k in range(n):
             counts[i, k] = 1 if weights[k] > 0 else 0

@@ -1,22 +1,34 @@
-"""What was photographed, and what is known about it: the value that all that follows starts from.
+"""What was photographed from one place, and what is known about it: the value that all that follows starts from.
 
-One place of the camera, far away or not, and one light for each photograph. The frame is the image's: x right, y up, z
-towards the camera, so that a sample lying flat faces +z; pixel (row, column) has x = column, y = -row in its spacing.
-Not here: reading one (`files/captures.py`), several cameras.
+    pixel (row, column)    x = (column + 1/2 - columns/2) texel,   y = (rows/2 - row - 1/2) texel,   z = 0
+
+This is the frame where nothing else is said: x right, y up, z towards the camera, so that a sample lying flat faces
++z, in texels. A camera sees its own pixels' rays meet the shape, or where none is given the plane z = 0. The eye may
+stand elsewhere than the camera whose pixels these are: photographs brought to a sample's plane have texels in a square
+grid, and were taken from `eye`.
+
+Not here: reading one (`files/captures.py`), photographs from several places (`turntable.py`).
 """
 
 from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..arrays import Array, frozen, to_numpy
-from ..directions import require_unit
+from ..arrays import Array, frozen, require_finite, to_numpy
+from ..cameras import Camera, Orthographic
+from ..directions import normalise, require_unit
 from ..errors import ArrayError
+from ..frames import frame
+from ..lights.model import Light
+from ..shapes.view import Shape, View
+from .lighting import directions_of, require_single
 from .photographs import Photographs
+from .sites import Observation, Sites
 
 if TYPE_CHECKING:
     from ..samples import RadianceSamples
@@ -27,53 +39,114 @@ if TYPE_CHECKING:
 class Capture:
     """`photographs`, N of (rows, columns).
 
-    directions: (N, 3), unit, towards each light; None where unknown. intensities: (N, 3) > 0, the irradiance of each
-    light on a plane that faces it, relative; ones where not told. mask: (rows, columns) bool, where the object is.
-    normals: (rows, columns, 3), unit on the mask where the shape is known, else None. layout: how it was found.
-    findings: what was not as it should be, and what was done about it.
+    lights: N, one for each photograph (`distant_lights`, `near_lights`); None where unknown. Their strengths are
+        relative, and 1 where not told. mask: (rows, columns) bool, where the object is. normals: (rows, columns, 3),
+        unit on the mask; where not given, those of the shape. shape: in the world, as far as it is known: it says where
+        pixels lie and what it shades. camera: that of the pixels; straight above, far away, with texels of 1, where not
+        given. eye: (3,), where the camera stood if not where `camera` has it. layout: how it was found. findings: what
+        was not as it should be, and what was done about it.
+
+    Raises `ArrayError` where shapes do not fit, `DirectionError` for normals that are not unit.
     """
 
     photographs: Photographs
-    directions: np.ndarray | None = None
-    intensities: Array = None
+    lights: tuple[Light, ...] | None = None
     mask: Array = None
-    normals: np.ndarray | None = None
+    normals: Array | None = None
+    shape: Shape | None = None
+    camera: Camera = None  # type: ignore[assignment]  # it is one once made
+    eye: Array | None = None
     layout: str = ""
     findings: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         n, size = len(self.photographs), tuple(self.photographs.size)
-        if self.directions is not None:
-            directions = frozen(to_numpy(self.directions), np.dtype(np.float64))
-            _require_shape("directions", directions, (n, 3))
-            require_unit(directions, "directions")
-            object.__setattr__(self, "directions", directions)
-        intensities = np.ones((n, 3)) if self.intensities is None else to_numpy(self.intensities)
-        intensities = frozen(intensities, np.dtype(np.float64))
-        _require_shape("intensities", intensities, (n, 3))
-        if not np.all(np.isfinite(intensities) & (intensities > 0)):
-            raise ArrayError("intensities are not all positive numbers.")
-        object.__setattr__(self, "intensities", intensities)
-        mask = np.ones(size, bool) if self.mask is None else frozen(to_numpy(self.mask), np.dtype(bool))
+        if self.lights is not None:
+            object.__setattr__(self, "lights", tuple(self.lights))
+            if len(self.lights) != n:
+                raise ArrayError(f"{len(self.lights)} lights came for {n} photographs.")
+            require_single(self.lights)
+        camera: Camera | None = self.camera
+        if camera is None:
+            object.__setattr__(self, "camera", above(size))
+        if self.camera.size != size:
+            raise ArrayError(f"the camera has {self.camera.size} pixels, the photographs {size}.")
+        if self.eye is not None:
+            eye = frozen(to_numpy(self.eye), np.dtype(np.float64))
+            _require_shape("eye", eye, (3,))
+            require_finite(eye, "eye")
+            object.__setattr__(self, "eye", eye)
+        mask = np.ones(size, bool) if self.mask is None else to_numpy(self.mask).astype(bool)
         _require_shape("mask", mask, size)
+        if self.shape is not None:
+            mask = mask & self._view.mask
         if not mask.any():
             raise ArrayError("mask is empty: no pixel is on the object.")
-        object.__setattr__(self, "mask", mask)
-        if self.normals is not None:
-            normals = frozen(to_numpy(self.normals), np.dtype(np.float32))
+        object.__setattr__(self, "mask", frozen(mask, np.dtype(bool)))
+        normals = self.normals
+        if normals is None and self.shape is not None:
+            normals = np.where(mask[..., None], self._view.normal, 0.0)
+        if normals is not None:
+            normals = frozen(to_numpy(normals), np.dtype(np.float32))
             _require_shape("normals", normals, (*size, 3))
             require_unit(normals[mask], "normals on the mask")
             object.__setattr__(self, "normals", normals)
 
-    def reflectance(self, least: float = 0.0) -> Reflectance:
+    @property
+    def directions(self) -> np.ndarray | None:
+        """(N, 3), unit, towards the lights, where they are known and distant; otherwise None."""
+        return directions_of(self.lights)
+
+    @cached_property
+    def positions(self) -> np.ndarray:
+        """(rows, columns, 3): where pixels see the shape, or the plane z = 0 where none is given; NaN where nothing."""
+        if self.shape is not None:
+            return self._view.position
+        origins, directions = self.camera.rays()
+        with np.errstate(divide="ignore", invalid="ignore"):
+            t = -origins[..., 2:] / directions[..., 2:]
+            positions: np.ndarray = np.where(t > 0, origins + t * directions, np.nan)
+        return positions
+
+    @cached_property
+    def sites(self) -> Sites:
+        """The pixels of the mask, along its rows. Raises `ArrayError` where normals are unknown."""
+        if self.normals is None:
+            raise ArrayError(
+                "the capture's shape is unknown: give normals, as by dataclasses.replace(capture, normals=...) from "
+                "photometric_stereo(capture).normals."
+            )
+        mask, n = self.mask, self.normals[self.mask].astype(np.float64)
+        positions = self.positions[mask]
+        require_finite(positions, "positions on the mask")
+        if self.shape is None:
+            return Sites(positions, positions, frame(n))
+        frames, tangent = np.asarray(frame(n)), self._view.tangent[mask]
+        # Where a texture gives no direction, or a normal of a map lies along it, any will do.
+        across = np.linalg.norm(np.cross(n, tangent), axis=1) > 1e-3
+        frames[across] = frame(n[across], tangent[across])
+        return Sites(positions, self._view.lifted[mask], frames)
+
+    def observe(self, k: int) -> Observation:
+        """What photograph k tells of every site."""
+        radiance, clipped = self.photographs.read(k)
+        return Observation(radiance[self.mask], ~clipped[self.mask], self._to_eye)
+
+    def observe_all(self, some: np.ndarray) -> Observation:
+        """What every photograph tells of sites `some` (S,): radiance (N, S, 3), known (N, S)."""
+        radiance, clipped = self.photographs.pixels(np.flatnonzero(self.mask)[some])
+        return Observation(radiance, ~clipped, self._to_eye[some])
+
+    def reflectance(self, least: float = 0.0, dark: float = 0.0, shadows: bool = True) -> Reflectance:
         """f(wi, wo) at every pixel of the mask under every light, streamed: `sampling.Reflectance`.
 
-        least: in [0, 1), the part of a pixel's mean below which a photograph is left out (MS 9: .05).
-        Raises `ArrayError` where lights or normals are unknown, `ParameterError` for another `least`.
+        least: in [0, 1), the part of a pixel's mean below which a photograph is left out (MS 9: .05). dark: >= 0, the
+        radiance below which it is. shadows: leave out what the shape shades, where one is given.
+        Raises `ArrayError` where lights or normals are unknown, `ParameterError` for another `least` or `dark`.
         """
         from .sampling import Reflectance
 
-        return Reflectance(self, least)
+        return Reflectance(self, least, dark, shadows)
 
     def radiance(self) -> Iterator[RadianceSamples]:
         """B(n, wo) at every pixel of the mask, whatever the light, a block for each photograph: `sampling.radiance`.
@@ -85,11 +158,32 @@ class Capture:
         return radiance(self)
 
     def mean(self) -> np.ndarray:
-        """The mean of all photographs over their lights' intensities, (rows, columns, 3)."""
+        """The mean of all photographs, (rows, columns, 3)."""
         total = np.zeros((*self.photographs.size, 3))
-        for k, intensity in enumerate(self.intensities):
-            total += self.photographs.read(k).radiance / intensity
+        for k in range(len(self.photographs)):
+            total += self.photographs.read(k).radiance
         return (total / len(self.photographs)).astype(np.float32)
+
+    @cached_property
+    def _view(self) -> View:
+        assert self.shape is not None
+        return self.shape.view(self.camera)
+
+    @cached_property
+    def _to_eye(self) -> np.ndarray:
+        """wo at the sites, (S, 3)."""
+        positions = self.positions[self.mask]
+        if self.eye is not None:
+            towards: np.ndarray = normalise(self.eye - positions, "eye - positions")
+            return towards
+        return -self.camera.rays()[1][self.mask]
+
+
+def above(size: tuple[int, ...], texel: float = 1.0) -> Orthographic:
+    """The camera straight above, far away, whose `size` (rows, columns) pixels are squares of `texel` about (0, 0)."""
+    pose = np.diag([1.0, -1.0, -1.0, 1.0])
+    pose[2, 3] = 16 * max(size) * texel
+    return Orthographic(pixel=texel, size=(size[0], size[1]), pose=pose)
 
 
 def _require_shape(name: str, array: np.ndarray, shape: tuple[int, ...]) -> None:

@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import dataclasses
 from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
 
-from ..arrays import frozen, require_finite, to_numpy
+from ..arrays import Array, frozen, require_finite, to_numpy
 from ..errors import ArrayError
 
 
@@ -34,11 +35,25 @@ class Photographs(ABC):
     def read(self, k: int) -> Photograph:
         """Photograph k, whole."""
 
-    def pixels(self, at: np.ndarray) -> Photograph:
-        """All photographs at pixels `at` (P,), counted along rows: radiance (N, P, 3) and clipped (N, P)."""
-        every = (self.read(k) for k in range(len(self)))
-        some = [(radiance.reshape(-1, 3)[at], clipped.reshape(-1)[at]) for radiance, clipped in every]
-        return Photograph(*(np.stack(parts) for parts in zip(*some, strict=True)))
+    def pixels(self, at: np.ndarray, progress: Callable[[int, int], None] | None = None) -> Photograph:
+        """All photographs at pixels `at` (P,), counted along rows: radiance (N, P, 3) and clipped (N, P).
+
+        progress(done, total) hears of photographs.
+        """
+        radiance = np.empty((len(self), len(at), 3), np.float32)
+        clipped = np.empty((len(self), len(at)), bool)
+        for k in range(len(self)):
+            one = self.read(k)
+            np.take(one.radiance.reshape(-1, 3), at, axis=0, out=radiance[k], mode="clip")
+            np.take(one.clipped.reshape(-1), at, out=clipped[k], mode="clip")
+            if progress is not None:
+                progress(k + 1, len(self))
+        return Photograph(radiance, clipped)
+
+    def parts(self, at: np.ndarray, most: int) -> Iterator[np.ndarray]:
+        """`at` (P,) in parts of at most `most` pixels, as `pixels` reads them soonest: indices into it."""
+        for low in range(0, len(at), most):
+            yield np.arange(low, min(low + most, len(at)))
 
     def __len__(self) -> int:
         return len(self.names)
@@ -63,3 +78,40 @@ class Held(Photographs):
     def read(self, k: int) -> Photograph:
         red, green, blue = np.moveaxis(self.radiance[k], -1, 0)
         return Photograph(self.radiance[k], (red >= self.white) | (green >= self.white) | (blue >= self.white))
+
+
+class Flattened(Photographs):
+    """`photographs` divided by what the lens leaves of light: `vignetting` (rows, columns, C), as of `flat_field`.
+
+    Raises `ArrayError` where it is of another size, or not positive.
+    """
+
+    def __init__(self, photographs: Photographs, vignetting: Array) -> None:
+        self.photographs, self.vignetting = photographs, checked_vignetting(vignetting, photographs.size)
+        self.names, self.size = photographs.names, photographs.size
+
+    def read(self, k: int) -> Photograph:
+        radiance, clipped = self.photographs.read(k)
+        return Photograph(radiance / self.vignetting, clipped)
+
+    def pixels(self, at: np.ndarray, progress: Callable[[int, int], None] | None = None) -> Photograph:
+        radiance, clipped = self.photographs.pixels(at, progress)
+        return Photograph(radiance / self.vignetting.reshape(-1, self.vignetting.shape[2])[at], clipped)
+
+    def parts(self, at: np.ndarray, most: int) -> Iterator[np.ndarray]:
+        return self.photographs.parts(at, most)
+
+
+def checked_vignetting(vignetting: Array, size: tuple[int, int]) -> np.ndarray:
+    """`vignetting` (rows, columns, 1 or 3) as float32, read-only. Raises `ArrayError` as `Flattened` does."""
+    divisor: np.ndarray = frozen(to_numpy(vignetting), np.dtype(np.float32))
+    if divisor.ndim != 3 or divisor.shape[:2] != size or divisor.shape[2] not in (1, 3):
+        raise ArrayError(f"vignetting has shape {divisor.shape}; {(*size, 3)} is wanted, the photographs' own size.")
+    require_finite(divisor, "vignetting")
+    if not (divisor > 0).all():
+        row, column, channel = (int(k) for k in np.argwhere(~(divisor > 0))[0])
+        raise ArrayError(
+            f"vignetting[{row}, {column}, {channel}] is {divisor[row, column, channel]:g}; a share of the light above "
+            "0 is wanted."
+        )
+    return divisor

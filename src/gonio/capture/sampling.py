@@ -1,35 +1,36 @@
 """Samples of reflectance or radiance from a capture whose shape is known, streamed a photograph at a time.
 
-    f(wi, wo) = I / (s n.wi)          I radiance, s the light's intensity; wi, wo in the frame of the site (frame(n))
-    variance of f ~ 1 / (n.wi)^2      where all photographs are as noisy: so weight = (n.wi)^2
+    f(wi, wo) = I / (E n.wi)          I radiance, E the light's irradiance at x on a plane that faces it (MS 8)
+    variance of f ~ 1 / (E n.wi)^2    where all photographs are as noisy: so weight = (E n.wi)^2, E the channels' mean
 
-Sites are pixels of the mask, counted along its rows. Left out are lights below the horizon, clipped pixels, and, as MS
-9 has it, what is darker than a part of the site's mean: noise or shadow, as likely as not. f is in 1/sr where
-intensities are irradiances and photographs radiances, and otherwise known up to one factor: that of a white target.
-
-The eye is straight above (an orthographic camera); near cameras and lights are not here.
+wi, wo are in the frame of the site. Sites are those of the capture: pixels of the mask, counted along its rows, or
+points of a shape that many cameras saw. Left out are lights below the horizon, clipped pixels, what the shape shades,
+what is darker than `dark`, and, as MS 9 has it, what is darker than a part of the site's mean: noise or shadow, as
+likely as not. f is in 1/sr where lights are in the units of the photographs, and otherwise known up to one factor: that
+of a white target.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Iterator
 from functools import cached_property
 
 import numpy as np
 
+from .._kernels import reflectance as kernels
 from ..errors import MEMORY_LIMIT, ArrayError, MemoryLimitError, ParameterError
-from ..frames import frame, to_local
+from ..frames import to_local
 from ..samples import RadianceSamples, ReflectanceSamples
-from .model import Capture
-
-_TO_EYE = np.array([0.0, 0.0, 1.0])
+from .lighting import arriving
+from .sites import Observation, Observing, Sites
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Slices:
-    """All lights at S sites (MS: slices of constant wo): wi (S, N, 3) and wo (S, 3), local; value (S, N, 3), NaN where
-    it is not known; weight (S, N)."""
+    """All lights at S sites (MS: slices of constant wo): wi (S, N, 3), and wo (S, 3), or (S, N, 3) where photographs
+    are from many places, local; value (S, N, 3), NaN where it is not known; weight (S, N)."""
 
     wi: np.ndarray
     wo: np.ndarray
@@ -41,115 +42,110 @@ class Slices:
 class Reflectance:
     """The reflectance samples of a capture: iterate for a block a photograph, or ask for all lights `at` some sites.
 
-    least: in [0, 1), the part of a site's mean below which a photograph is left out (MS 9: .05).
+    least: in [0, 1), the part of a site's mean below which a photograph is left out (MS 9: .05). dark: >= 0, the
+    radiance below which it is. shadows: leave out what the shape shades, where there is one.
     """
 
-    capture: Capture
+    capture: Observing
     least: float = 0.0
+    dark: float = 0.0
+    shadows: bool = True
 
     def __post_init__(self) -> None:
         if not 0 <= self.least < 1:
             raise ParameterError(f"least = {self.least}; a part of the mean lies in [0, 1).")
-        if self.capture.directions is None:
-            raise ArrayError("the capture's lights are unknown. Use radiance(), or give their directions.")
-        _require_shape(self.capture)
+        if not 0 <= self.dark < math.inf:
+            raise ParameterError(f"dark = {self.dark}; a radiance >= 0 is wanted.")
+        if self.capture.lights is None:
+            raise ArrayError("the capture's lights are unknown. Use radiance(), or give them: distant_lights(...).")
+        _ = self.capture.sites  # refuses what has no shape
 
     def __len__(self) -> int:
         """How many sites there are."""
-        return int(np.count_nonzero(self.capture.mask))
-
-    @cached_property
-    def frames(self) -> np.ndarray:
-        """The sites' frames, (sites, 3, 3)."""
-        assert self.capture.normals is not None
-        return np.asarray(frame(self.capture.normals[self.capture.mask].astype(np.float64)))
-
-    @cached_property
-    def _dark(self) -> np.ndarray:
-        """Below which a site is left out, (sites,), of the mean of the channels."""
-        total, count = np.zeros(len(self)), np.zeros(len(self))
-        for k in range(len(self.capture.photographs)):
-            values, known = self._photograph(k)
-            total += np.where(known, values.mean(axis=1), 0)
-            count += known
-        return self.least * total / np.maximum(count, 1)
+        return len(self.capture.sites)
 
     def __iter__(self) -> Iterator[ReflectanceSamples]:
         """A block for each photograph that lights any site."""
-        capture = self.capture
-        assert capture.directions is not None
-        wo = to_local(self.frames, _TO_EYE)
-        for k in range(len(capture.photographs)):
-            values, known = self._photograph(k)
-            wi = to_local(self.frames, capture.directions[k])
-            lit = self._lit(values, known, wi, wo)
-            if lit.any():
-                cosine = wi[lit, 2]
-                f = values[lit] / cosine[:, None]
-                yield ReflectanceSamples(np.flatnonzero(lit), wi[lit], wo[lit], f, cosine**2)
+        sites = self.capture.sites
+        floor = self._floor if self.least else np.zeros(len(sites))
+        for k in range(len(self.capture.photographs)):
+            seen = self.capture.observe(k)
+            one = Observation(seen.radiance[None], seen.known[None], seen.wo)
+            wi, wo, value, weight = self._reflected(slice(k, k + 1), sites, one, floor)
+            lit = np.flatnonzero(weight)
+            if lit.size:
+                parts = (np.take(x, lit, axis=0) for x in (wi[:, 0], wo, value[:, 0], weight[:, 0]))
+                yield ReflectanceSamples(lit, *parts)
 
-    def at(self, sites: np.ndarray) -> Slices:
-        """All lights at `sites` (S,), whole numbers below the length: quick from a store (`gonio ingest`), while files
-        are all decoded for it.
+    def at(self, some: np.ndarray) -> Slices:
+        """All lights at sites `some` (S,), whole numbers below the length: quick from a store (`gonio ingest`), while
+        files are all decoded for it.
 
         Raises `MemoryLimitError` before more memory is taken than the limit.
         """
-        capture = self.capture
-        assert capture.directions is not None
-        count = len(capture.photographs)
-        if 80 * len(sites) * count > MEMORY_LIMIT:
-            raise MemoryLimitError(f"{len(sites)} sites under {count} lights exceed the memory limit. Ask for fewer.")
-        frames = self.frames[sites]
-        wi = to_local(frames[:, None], capture.directions[None])
-        wo = to_local(frames, _TO_EYE)
-        value, weight = np.full((len(sites), count, 3), np.nan), np.zeros((len(sites), count))
-        radiance, clipped = capture.photographs.pixels(np.flatnonzero(capture.mask)[sites])
-        values = np.swapaxes(radiance / capture.intensities[:, None], 0, 1)
-        known = ~clipped.T
-        lit = known & (wi[..., 2] > 0) & (wo[:, None, 2] > 0)
+        count = len(self.capture.photographs)
+        if 100 * len(some) * count > MEMORY_LIMIT:
+            raise MemoryLimitError(f"{len(some)} sites under {count} lights exceed the memory limit. Ask for fewer.")
+        sites, every = self.capture.sites[some], slice(0, count)
+        seen = self.capture.observe_all(some)
+        floor = np.zeros(len(sites))
         if self.least:
-            bright = values.mean(axis=2)
-            mean = np.sum(np.where(known, bright, 0), axis=1) / np.maximum(known.sum(axis=1), 1)
-            lit &= bright >= self.least * mean[:, None]
-        value[lit] = values[lit] / wi[lit][:, 2:]
-        weight[lit] = wi[lit][:, 2] ** 2
-        return Slices(wi, wo, value, weight)
+            number = np.zeros(len(sites))
+            kernels.brightness(seen.radiance, seen.known, self._arriving(every, sites)[1], floor, number)
+            floor *= self.least / np.maximum(number, 1)
+        return Slices(*self._reflected(every, sites, seen, floor))
 
-    def _photograph(self, k: int) -> tuple[np.ndarray, np.ndarray]:
-        """Radiance over intensity (sites, 3), and where it is known."""
-        radiance, clipped = self.capture.photographs.read(k)
-        mask = self.capture.mask
-        return radiance[mask].astype(np.float64) / self.capture.intensities[k], ~clipped[mask]
+    @cached_property
+    def _floor(self) -> np.ndarray:
+        """Below which a site is left out, (sites,), of radiance over irradiance, the mean of the channels."""
+        sites = self.capture.sites
+        total, number = np.zeros(len(sites)), np.zeros(len(sites))
+        for k in range(len(self.capture.photographs)):
+            seen = self.capture.observe(k)
+            irradiance = self._arriving(slice(k, k + 1), sites)[1]
+            kernels.brightness(seen.radiance[None], seen.known[None], irradiance, total, number)
+        return self.least * total / np.maximum(number, 1)
 
-    def _lit(self, values: np.ndarray, known: np.ndarray, wi: np.ndarray, wo: np.ndarray) -> np.ndarray:
-        lit: np.ndarray = known & (wi[:, 2] > 0) & (wo[:, 2] > 0)
-        if self.least:
-            lit &= values.mean(axis=1) >= self._dark
-        return lit
+    def _arriving(self, some: slice, sites: Sites) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Directions and irradiances (N, 1 or S, 3) of lights `some`, and their distances (N, 1 or S)."""
+        assert self.capture.lights is not None
+        lights = self.capture.lights[some]
+        positions = sites.positions[:1] if all(light.distant for light in lights) else sites.positions
+        direction, irradiance, distance = zip(*(arriving(light, positions) for light in lights), strict=True)
+        return np.stack(direction), np.stack(irradiance), np.stack(distance)
+
+    def _reflected(
+        self, some: slice, sites: Sites, seen: Observation, floor: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """wi, wo, value, weight of `Slices`, of photographs `some`."""
+        direction, irradiance, distance = self._arriving(some, sites)
+        moving = seen.wo.ndim == 3
+        wo = np.asarray(to_local(sites.frames[:, None] if moving else sites.frames, np.moveaxis(seen.wo, -2, 0)))
+        facing = np.atleast_2d(wo[..., 2].T > 0)
+        shape = (len(sites), len(seen.radiance))
+        wi, value, weight = np.empty((*shape, 3)), np.empty((*shape, 3)), np.empty(shape)
+        kernels.reflect(
+            seen.radiance, seen.known, facing, sites.frames, direction, irradiance, self.dark, floor, wi, value, weight
+        )
+        if self.shadows and self.capture.shape is not None:
+            for k in range(shape[1]):
+                lit = np.flatnonzero(weight[:, k])
+                w, far = (np.broadcast_to(a[k], (len(sites), *a.shape[2:]))[lit] for a in (direction, distance))
+                dark = lit[self.capture.shape.occluded(sites.lifted[lit], w, far)]
+                value[dark, k], weight[dark, k] = np.nan, 0
+        return wi, wo, value, weight
 
 
-def radiance(capture: Capture) -> Iterator[RadianceSamples]:
+def radiance(capture: Observing) -> Iterator[RadianceSamples]:
     """The radiance samples of a capture with known normals, whatever the light, a block for each photograph.
 
     Clipped pixels are left out; all others weigh alike. Raises `ArrayError` where normals are unknown.
     """
-    _require_shape(capture)
-    assert capture.normals is not None
-    normal = capture.normals[capture.mask].astype(np.float64)
-    facing = normal[:, 2] > 0
+    sites = capture.sites
+    normal = sites.frames[:, 2]
     for k in range(len(capture.photographs)):
-        image, clipped = capture.photographs.read(k)
-        seen = facing & ~clipped[capture.mask]
+        image, known, towards = capture.observe(k)
+        seen = known & (np.sum(normal * towards, axis=1) > 0)
         if seen.any():
             site = np.flatnonzero(seen)
-            wo = np.broadcast_to(_TO_EYE, (site.size, 3))
-            value = image[capture.mask][seen] / capture.intensities[k]
-            yield RadianceSamples(site, normal[seen], wo, value, np.ones(site.size))
-
-
-def _require_shape(capture: Capture) -> None:
-    if capture.normals is None:
-        raise ArrayError(
-            "the capture's shape is unknown: give normals, as by dataclasses.replace(capture, normals=...) from "
-            "photometric_stereo(capture).normals."
-        )
+            yield RadianceSamples(site, normal[seen], towards[seen], image[seen], np.ones(site.size))

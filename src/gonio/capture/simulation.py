@@ -4,26 +4,32 @@
 
 E radiance by brute force (`reflection.radiance`, with shadow rays where asked for), g the exposure, noise and gain in
 units of the brightest code. Photographs are made when they are asked for, each from its own seed, so that a thousand
-take no memory and always come out the same. The directions that the capture tells may be off from the true ones.
+take no memory and always come out the same. The lights that the capture tells may be off from the true ones. Not here:
+light that surfaces send to each other, lenses out of focus.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
 from ..arrays import to_numpy
 from ..brdf.model import BRDF
 from ..cameras import Camera, Orthographic, look_at
-from ..directions import normalise, require_unit
+from ..directions import normalise
 from ..errors import ArrayError, ParameterError
-from ..lights.points import Directional
-from ..reflection import radiance
+from ..lights.model import Light
+from ..lights.points import Directional, Point
+from ..lights.uneven import Uneven
+from ..reflection import radiance, textured
+from ..shapes.mesh import Mesh
 from ..shapes.view import Shape, View
 from .model import Capture
 from .photographs import Photograph, Photographs
+from .turntable import Turntable
 
 
 @dataclasses.dataclass(frozen=True)
@@ -44,48 +50,59 @@ class Sensor:
 
 
 class SimulatedPhotographs(Photographs):
-    """What `sensor` records of `material` on what `view` saw, under one light after the other."""
+    """What `sensor` records of `shape` with `material`: photograph k by cameras[k] under lights[k].
+
+    Parameters of the material that vary over two axes are textures of the shape's uv, bilinear.
+    """
 
     def __init__(
         self,
         shape: Shape,
         material: BRDF,
-        view: View,
-        directions: np.ndarray,
-        intensities: np.ndarray,
+        cameras: Sequence[Camera],
+        lights: Sequence[Light],
         sensor: Sensor,
         shadows: bool,
         seed: int,
     ) -> None:
-        self.shape, self.material, self.view, self.sensor = shape, material, view, sensor
-        self.directions, self.intensities, self.shadows, self.seed = directions, intensities, shadows, seed
-        self.names = tuple(f"photo{k:0{len(str(len(directions) - 1))}}.png" for k in range(len(directions)))
-        rows, columns = view.mask.shape
-        self.size = rows, columns
+        self.shape, self.material, self.sensor = shape, material, sensor
+        self.cameras, self.lights, self.shadows, self.seed = tuple(cameras), tuple(lights), shadows, seed
+        self.names = tuple(f"photo{k:0{len(str(len(lights) - 1))}}.png" for k in range(len(lights)))
+        self.size = self.cameras[0].size
+        self._seen: tuple[Camera, View, BRDF] | None = None
+
+    def view(self, k: int) -> View:
+        """What camera k sees of the shape."""
+        return self._scene(k)[0]
 
     def truth(self, k: int) -> np.ndarray:
-        """Radiance without camera, (rows, columns, 3): black where nothing is."""
-        view, mask = self.view, self.view.mask
+        """Radiance without sensor, (rows, columns, 3): black where nothing is."""
+        view, material = self._scene(k)
+        mask = view.mask
         image = np.zeros((*mask.shape, 3))
-        light = Directional(self.directions[k], self.intensities[k])
 
         def arriving(x: np.ndarray, w: np.ndarray, distance: np.ndarray) -> np.ndarray:
             return ~self.shape.occluded(x, w, distance)
 
-        image[mask] = to_numpy(
-            radiance(
-                self.material,
-                light,
-                view.frames[mask],
-                view.wo[mask],
-                view.lifted[mask],
-                visibility=arriving if self.shadows else None,
+        if mask.any():
+            image[mask] = to_numpy(
+                radiance(
+                    material,
+                    self.lights[k],
+                    view.frames[mask],
+                    view.wo[mask],
+                    view.lifted[mask],
+                    visibility=arriving if self.shadows else None,
+                )
             )
-        )
         return image
 
     def read(self, k: int) -> Photograph:
-        sensor, rng = self.sensor, np.random.default_rng((self.seed, k))
+        return self.exposed(k, self.sensor)
+
+    def exposed(self, k: int, sensor: Sensor) -> Photograph:
+        """Photograph k by another sensor, or another exposure of the same one, with noise of its own."""
+        rng = np.random.default_rng((self.seed, k, int(np.float64(sensor.exposure).view(np.uint64))))
         code = sensor.exposure * self.truth(k)
         if sensor.gain or sensor.read:
             code = code + rng.normal(size=code.shape) * np.sqrt(sensor.gain * code + sensor.read**2)
@@ -95,54 +112,117 @@ class SimulatedPhotographs(Photographs):
             code = np.floor(code * steps + 0.5) / steps
         return Photograph((code / sensor.exposure).astype(np.float32), np.asarray((code >= 1).any(axis=2)))
 
+    def _scene(self, k: int) -> tuple[View, BRDF]:
+        """What camera k sees, and the material there: kept while the camera stays."""
+        camera = self.cameras[k]
+        if self._seen is None or self._seen[0] is not camera:
+            view = self.shape.view(camera)
+            uv = None if view.uv is None else view.uv[view.mask]
+            self._seen = camera, view, textured(self.material, uv)
+        return self._seen[1:]
+
 
 def simulate(
     shape: Shape,
     material: BRDF,
-    directions: np.ndarray,
+    lights: Sequence[Light],
     camera: Camera | None = None,
-    intensities: np.ndarray | None = None,
     sensor: Sensor | None = None,
     *,
     shadows: bool = False,
     misaligned: float = 0.0,
     seed: int = 0,
 ) -> Capture:
-    """The capture of `shape` with `material` under lights from unit `directions` (N, 3), with its normals and mask.
+    """The capture of `shape` with `material` from one place, a photograph under each of the N `lights`, with its truth.
 
-    camera: orthographic from +z, 256 pixels along the longer side, where None; it has to look along -z. intensities
-    (N, 3): the lights' irradiance, pi where None, so that white is 1. sensor: without noise or codes where None.
-    misaligned: degrees rms by which the directions that the capture tells are off. seed: of noise and misalignment.
+    material: where its parameters vary over two axes, they are textures over the shape's uv. lights: of any kind; where
+    they are environments, the capture does not tell them. Distant ones of irradiance pi make white 1. camera:
+    orthographic from +z, 256 pixels along the longer side, where None. sensor: without noise or codes where None.
+    shadows: those that the shape casts. misaligned: degrees rms by which the lights that the capture tells are off, as
+    seen from the middle of the shape. seed: of noise and misalignment.
 
-    Raises `DirectionError` for directions that are not unit, `ArrayError` where the camera sees nothing of the shape or
-    shapes do not fit, `ParameterError` for a camera that looks elsewhere.
+    Raises `ArrayError` where there is no light or the camera sees nothing of the shape, `ParameterError` for a texture
+    on a shape without uv.
     """
-    directions = np.asarray(directions, dtype=np.float64)
-    if directions.ndim != 2 or directions.shape[1] != 3 or not len(directions):
-        raise ArrayError(f"directions have shape {directions.shape}; (N, 3) is wanted.")
-    require_unit(directions, "directions")
-    lights = np.full((len(directions), 3), math.pi) if intensities is None else np.asarray(intensities, np.float64)
-    if lights.shape != directions.shape:
-        raise ArrayError(f"intensities have shape {lights.shape}; {directions.shape} is wanted.")
-    if not (math.isfinite(misaligned) and misaligned >= 0):
-        raise ParameterError(f"misaligned = {misaligned}; degrees >= 0 are wanted.")
+    lights = _some(lights)
     camera = from_above(shape, 256) if camera is None else camera
-    if not np.allclose(camera.forward, [0, 0, -1], atol=1e-6):
-        raise ParameterError("the camera of a capture looks along -z; from_above(shape, size) makes one.")
-    view = shape.view(camera)
+    photographs = SimulatedPhotographs(
+        shape, material, [camera] * len(lights), lights, Sensor() if sensor is None else sensor, shadows, seed
+    )
+    view = photographs.view(0)
     if not view.mask.any():
         raise ArrayError("the camera sees nothing of the shape.")
-    photographs = SimulatedPhotographs(
-        shape, material, view, directions, lights, Sensor() if sensor is None else sensor, shadows, seed
-    )
-    told = directions
-    if misaligned:
-        # Two components across the direction, each a root of a half of it.
-        across = np.random.default_rng((seed, len(directions))).normal(size=directions.shape)
-        across -= (across * directions).sum(axis=1, keepdims=True) * directions
-        told = normalise(directions + across * (math.radians(misaligned) / math.sqrt(2)))
     normals = np.where(view.mask[..., None], view.normal, 0.0)
-    return Capture(photographs, told, lights, view.mask, normals, "simulated")
+    told = _told(lights, shape, misaligned, seed)
+    return Capture(photographs, told, view.mask, normals, shape, camera, layout="simulated")
+
+
+def simulate_turntable(
+    shape: Mesh,
+    material: BRDF,
+    lights: Light | Sequence[Light],
+    cameras: Sequence[Camera],
+    sensor: Sensor | None = None,
+    *,
+    shadows: bool = False,
+    misaligned: float = 0.0,
+    seed: int = 0,
+) -> Turntable:
+    """Photographs of a mesh by each of `cameras`, under one of the `lights` each, or all under the same one.
+
+    Arguments and errors are those of `simulate`; cameras are of one size.
+    """
+    every = (lights,) * len(cameras) if isinstance(lights, Light) else _some(lights)
+    if len(every) != len(cameras) or not every:
+        raise ArrayError(f"{len(every)} lights came for {len(cameras)} cameras.")
+    if any(camera.size != cameras[0].size for camera in cameras):
+        raise ArrayError("cameras are not all of one size.")
+    photographs = SimulatedPhotographs(
+        shape, material, cameras, every, Sensor() if sensor is None else sensor, shadows, seed
+    )
+    return Turntable(
+        photographs, tuple(cameras), shape, _told(every, shape, misaligned, seed), layout="simulated turntable"
+    )
+
+
+def _some(lights: Sequence[Light]) -> tuple[Light, ...]:
+    lights = tuple(lights)
+    if not lights:
+        raise ArrayError("no light was given: a capture has a photograph for each.")
+    for k, light in enumerate(lights):
+        if not isinstance(light, Light):
+            raise ArrayError(f"lights[{k}] is {type(light).__name__}; distant_lights(directions) makes lights.")
+    return lights
+
+
+def _told(lights: tuple[Light, ...], shape: Shape, misaligned: float, seed: int) -> tuple[Light, ...] | None:
+    """The lights as the capture tells them: turned a little about the middle of the shape, None where they are many."""
+    if not (math.isfinite(misaligned) and misaligned >= 0):
+        raise ParameterError(f"misaligned = {misaligned}; degrees >= 0 are wanted.")
+    low, high = shape.bounds
+    middle, rng = (low + high) / 2, np.random.default_rng((seed, len(lights)))
+
+    def turned(offset: np.ndarray) -> np.ndarray:
+        length = float(np.linalg.norm(offset))
+        # Two components across the direction, each a root of a half of it.
+        across = rng.normal(size=3)
+        across -= (across @ offset) / length**2 * offset
+        direction: np.ndarray = normalise(offset / length + across * (math.radians(misaligned) / math.sqrt(2)))
+        return length * direction
+
+    def off(light: Light) -> Light | None:
+        if isinstance(light, Uneven):
+            bare = off(light.light)
+            return None if bare is None else dataclasses.replace(light, light=bare)
+        if isinstance(light, Directional):
+            return dataclasses.replace(light, direction=turned(light.direction)) if misaligned else light
+        if isinstance(light, Point):
+            place = middle + turned(light.position - middle) if misaligned else light.position
+            return dataclasses.replace(light, position=place)
+        return None
+
+    told = [off(light) for light in lights]
+    return None if any(light is None for light in told) else tuple(told)  # type: ignore[arg-type]
 
 
 def from_above(shape: Shape, size: int) -> Orthographic:

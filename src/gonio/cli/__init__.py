@@ -13,7 +13,7 @@ from typing import Any
 import typer
 
 from ..errors import GonioError
-from . import calibrate, convert, demo, info, ingest, normals, prefilter, render, sh, simulate
+from . import calibrate, convert, demo, flat, info, ingest, merge, normals, prefilter, rectify, render, sh, simulate
 
 Usage: Any = typer.BadParameter.__base__  # click's error for whatever is mistyped, which typer does not name
 
@@ -45,7 +45,10 @@ for verb in (
     info.info,
     convert.convert,
     ingest.ingest,
+    merge.merge,
+    flat.flat,
     calibrate.calibrate,
+    rectify.rectify,
     normals.normals,
     simulate.simulate,
     render.render,

@@ -19,21 +19,27 @@ PARTIAL = typer.Option(False, "--partial", help="Take what is sound where photog
 
 
 def read(folder: Path, encoding: str, partial: bool, lights: Path | None = None) -> Capture:
-    """The capture, with the lights of an .lp in the place of its own; what was found amiss is said on stderr."""
+    """The capture, with the lights of an .lp in the place of its own; what was found amiss is said on stderr.
+
+    Raises `FileError` where its photographs are from many places.
+    """
     import gonio as gn
 
-    capture = gn.read_capture(folder, _encoding(encoding), partial=partial)
+    capture = gn.read_capture(folder, curve(encoding), partial=partial)
     for finding in capture.findings:
         typer.echo(f"{folder}: {finding}", err=True)
+    if not isinstance(capture, gn.Capture):
+        raise FileError(f"{folder} is of photographs from many places; photographs from one place are wanted.")
     if lights is None:
         return capture
     given = gn.read_lp(lights)
     if len(given.names) != len(capture.photographs):
         raise FileError(f"{lights} has {len(given.names)} lights for {len(capture.photographs)} photographs.")
-    return dataclasses.replace(capture, directions=given.directions)
+    return dataclasses.replace(capture, lights=gn.distant_lights(given.directions))
 
 
-def _encoding(text: str) -> str | float | None:
+def curve(text: str) -> str | float | None:
+    """What `--encoding` says, None where it is not given."""
     if text in ("", "srgb", "linear"):
         return text or None
     try:

@@ -12,6 +12,7 @@ import typer
 
 if TYPE_CHECKING:
     from ..capture.model import Capture
+    from ..capture.turntable import Turntable
 
 IMAGES = (".exr", ".hdr", ".pic", ".pfm", ".png", ".tif", ".tiff", ".jpg", ".jpeg", ".tga")
 RAW = (".dng", ".cr2", ".cr3", ".nef", ".arw", ".raf", ".orf", ".rw2")
@@ -151,7 +152,7 @@ def _brdf(path: Path) -> dict[str, Any]:
     return facts
 
 
-def _captured(path: Path) -> Capture:
+def _captured(path: Path) -> Capture | Turntable:
     """What is sound of a capture. That its encoding is not stated is among its facts."""
     import gonio as gn
     from gonio.errors import EncodingWarning
@@ -162,19 +163,31 @@ def _captured(path: Path) -> Capture:
 
 
 def _capture(path: Path) -> dict[str, Any]:
+    import gonio as gn
+
     capture = _captured(path)
-    rows, columns = capture.photographs.size
+    photographs = capture.photographs
+    files = getattr(photographs, "photographs", photographs)  # beneath what the lens leaves of light
+    exposures = getattr(photographs, "times", ())
     facts: dict[str, Any] = {
         "kind": "capture",
         "layout": capture.layout,
-        "photographs": len(capture.photographs),
-        "rows": rows,
-        "columns": columns,
-        "lights": "unknown" if capture.directions is None else len(capture.directions),
-        "object": f"{capture.mask.mean():.1%} of the pixels",
-        "encoding": "not stated" if getattr(capture.photographs, "assumed", False) else "stated",
-        "normals": "given" if capture.normals is not None else "unknown",
+        "photographs": len(photographs),
+        **({"exposures, seconds": list(exposures)} if exposures else {}),
+        "rows": photographs.size[0],
+        "columns": photographs.size[1],
+        "lights": "unknown" if capture.lights is None else len(capture.lights),
+        "encoding": "not stated" if getattr(files, "assumed", False) else "stated",
     }
+    near = sum(not light.distant for light in capture.lights or ())
+    if near:
+        facts["near lights"] = near
+    if isinstance(capture, gn.Capture):
+        facts["object"] = f"{capture.mask.mean():.1%} of the pixels"
+        facts["normals"] = "given" if capture.normals is not None else "unknown"
+    else:
+        facts["places"] = len({tuple(camera.position) for camera in capture.cameras})
+        facts["shape"] = "unknown" if capture.shape is None else f"{len(capture.shape.faces)} faces"
     if capture.findings:
         facts["looks wrong"] = "; ".join(capture.findings)
     return facts

@@ -17,6 +17,8 @@ def normals(
     output: Path = typer.Option(..., "--output", "-o", help="A folder for normals.png, relief.exr and relief.png."),
     lights: Path | None = typer.Option(None, "--lights", help="An .lp to use instead: its lights in the same order."),
     white: Path | None = typer.Option(None, "--white", help="A capture of a flat white target under the same lights."),
+    falloff: bool = typer.Option(False, "--falloff", help="Of each light over the white target, LED by LED, too."),
+    strengths: bool = typer.Option(False, "--strengths", help="How bright each light is is unknown: find it too."),
     encoding: str = captures.ENCODING,
     partial: bool = captures.PARTIAL,
     plain: bool = typer.Option(False, "--plain", help="Least squares of all photographs, shadows and highlights too."),
@@ -26,26 +28,36 @@ def normals(
     import numpy as np
 
     import gonio as gn
+    from gonio.capture.near_stereo import heights_of, near_photometric_stereo
     from gonio.files.whole import writable
     from gonio.viewer.captures import relief_picture
 
+    if falloff and not white:
+        raise gn.GonioError("--falloff is told from a white target: give --white.")
     scene = captures.read(capture, encoding, partial, lights)
     if white:
-        from gonio.capture.white import intensities_of_white
+        from gonio.capture.white import lights_of_white
 
-        target = dataclasses.replace(captures.read(white, encoding, partial), directions=scene.directions)
-        scene = dataclasses.replace(scene, intensities=intensities_of_white(target))
+        target = dataclasses.replace(captures.read(white, encoding, partial), lights=scene.lights)
+        scene = dataclasses.replace(scene, lights=lights_of_white(target, falloff=falloff))
+    if strengths:
+        from gonio.capture.semicalibrated import estimate_strengths
+
+        found_strengths = estimate_strengths(scene)
+        scene = dataclasses.replace(scene, lights=found_strengths.lights)
     output.mkdir(parents=True, exist_ok=True)
     names = ("normals.png", "relief.exr", "relief.png")
     for name in names:
         writable(output / name)
+    near = any(not light.distant for light in scene.lights or ())
     with bar("normals") as progress:
-        relief = gn.photometric_stereo(scene, robust=not plain, progress=progress)
-    found = np.isfinite(relief.error) & (relief.normals[..., 2] > 0)
-    if not found.any():
-        raise gn.GonioError(f"{capture}: no pixel has a normal. Do the lights belong to these photographs?")
-    # What is known to a degree counts as a hundred of what is known to ten.
-    surface = gn.integrate_normals(relief.normals, found, 1 / (relief.error**2 + np.radians(0.1) ** 2))
+        if near:
+            together = near_photometric_stereo(scene, not plain, progress)
+            relief, surface = together.relief, together.surface
+        else:
+            relief = gn.photometric_stereo(scene, robust=not plain, progress=progress)
+            surface = heights_of(relief)
+    found = np.isfinite(surface.heights)
     codes = np.where(found[..., None], 0.5 * relief.normals + 0.5, 0.0)
     gn.write_image(output / "normals.png", codes, "linear", bits=16, clip=True)
     layers = {"normals": relief.normals, "albedo": relief.albedo, "residual": relief.residual, "error": relief.error}
@@ -57,6 +69,7 @@ def normals(
         "residual": float(np.median(relief.residual[found])),
         "standard error, degrees": float(np.degrees(np.median(relief.error[found]))),
         "heights": surface.reason,
+        **({"near lights": together.reason} if near else {}),
     }
     if scene.normals is not None:
         both = found & scene.mask
@@ -70,5 +83,5 @@ def normals(
         for name, value in facts.items():
             typer.echo(f"{name:>36}  {value:.4g}" if isinstance(value, float) else f"{name:>36}  {value}")
         typer.echo(f"{', '.join(names)} in {output}")
-    if not surface.converged:
+    if not surface.converged or (near and not together.converged):
         raise typer.Exit(1)

@@ -3,6 +3,7 @@
 --brdf lambert:albedo=.5/.3/.1  --brdf ggx:alpha=.2,eta=1.5         terms that are added
 --brdf gold.bsdf                                                    a measured file
 --brdf sgd_params.json:teflon                                       a material of a file of fits
+--brdf lambert:albedo=@wood.png                                     a texture over uv, linear
 --sun 1,0,1   --sun 1,0,1:3/2.8/2.5                                 direction[:irradiance]
 """
 
@@ -121,12 +122,18 @@ def _microfacet(facets: str, given: dict[str, Any], text: str) -> BRDF:
 
 
 def _made(model: Any, given: dict[str, Any], text: str) -> Any:
+    import gonio as gn
+
     fields = [field.name for field in dataclasses.fields(model) if field.init]
     for key in given:
         if key not in fields:
             raise ParameterError(f"'{text}': {model.__name__} has no '{key}'; it has {', '.join(fields)}.")
-        if isinstance(given[key], list) and not (key in model.bounds and model.bounds[key].colour):
+        colour = key in model.bounds and model.bounds[key].colour
+        if isinstance(given[key], list) and not colour:
             raise ParameterError(f"'{text}': {key} is one number; only colours are written r/g/b.")
+        if isinstance(given[key], Path):
+            image = gn.read_image(given[key])
+            given[key] = image if colour else image[..., 0]
     missing = [
         field.name
         for field in dataclasses.fields(model)
@@ -144,7 +151,7 @@ def _pair(part: str, text: str) -> tuple[str, Any]:
     key, equals, value = part.partition("=")
     if not equals:
         raise ParameterError(f"'{text}': '{part}' is not key=value.")
-    return key.strip().replace("-", "_"), _value(value)
+    return key.strip().replace("-", "_"), Path(value[1:]) if value.startswith("@") else _value(value)
 
 
 def _value(text: str) -> Any:

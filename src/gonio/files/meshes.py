@@ -2,7 +2,7 @@
 
 Vertices, texture coordinates and normals are those of the file, in its axes: many meshes have y up where gonio has z.
 A vertex that an OBJ gives several texture coordinates or normals becomes several vertices. Quads and larger faces are
-cut into triangles. Not here: materials and textures, scenes (glTF), and writing.
+cut into triangles. Written are OBJ files. Not here: materials and textures, scenes (glTF).
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import numpy as np
 from ..errors import ArrayError, FileError
 from ..shapes.mesh import Mesh
 from .raster import decoding, require_file
+from .whole import writing
 
 
 def read_mesh(path: str | os.PathLike[str]) -> Mesh:
@@ -49,6 +50,22 @@ def read_mesh(path: str | os.PathLike[str]) -> Mesh:
         )
     except ArrayError as error:
         raise FileError(f"{path}: {error}") from error
+
+
+def write_mesh(path: str | os.PathLike[str], mesh: Mesh) -> None:
+    """Write an .obj with the mesh's normals, and its texture coordinates where it has them, whole or not at all.
+
+    Raises `FileError` for another suffix.
+    """
+    path = Path(path)
+    if path.suffix.lower() != ".obj":
+        raise FileError(f"{path}: meshes are written as .obj, not {path.suffix or 'without suffix'}.")
+    tables = {"v": mesh.vertices, "vn": mesh.normals} | ({} if mesh.uv is None else {"vt": mesh.uv})
+    lines = [f"{key} {' '.join(f'{x:.9g}' for x in row)}" for key, rows in tables.items() for row in rows.tolist()]
+    corner = "{0}//{0}" if mesh.uv is None else "{0}/{0}/{0}"
+    lines += [f"f {' '.join(corner.format(k + 1) for k in face)}" for face in mesh.faces.tolist()]
+    with writing(path) as temporary:
+        temporary.write_text("\n".join(lines) + "\n", "ascii")
 
 
 def _obj(file: BinaryIO) -> list[Mapping[str, Any]]:

@@ -10,7 +10,7 @@ Writing goes on where it was stopped. Memory is that of one chunk's photographs,
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -52,22 +52,54 @@ class StoredPhotographs(Photographs):
         self._held: tuple[int, np.ndarray] | None = None
 
     def read(self, k: int) -> Photograph:
+        return photograph(self.path, self.raster(k), self.encoding)
+
+    def raster(self, k: int) -> Raster:
+        """The samples of photograph k as its file had them."""
         group = k // _GROUP
         if self._held is None or self._held[0] != group:
             self._held = group, self._read((slice(group * _GROUP, (group + 1) * _GROUP), slice(None), slice(None)))
-        return self._photograph(self._held[1][k - group * _GROUP])
+        return Raster(self._held[1][k - group * _GROUP])
 
-    def pixels(self, at: np.ndarray) -> Photograph:
-        rows, columns = np.divmod(np.asarray(at), self.size[1])
-        radiance = np.empty((len(self.names), len(rows), 3), np.float32)
-        clipped = np.empty((len(self.names), len(rows)), bool)
-        tiles = (rows // _TILE) * (self.size[1] // _TILE + 1) + columns // _TILE
-        for tile in np.unique(tiles):
+    def pixels(self, at: np.ndarray, progress: Callable[[int, int], None] | None = None) -> Photograph:
+        return photograph(self.path, self.rasters(at, progress), self.encoding)
+
+    def rasters(self, at: np.ndarray, progress: Callable[[int, int], None] | None = None) -> Raster:
+        """The samples of all photographs at pixels `at` (P,), (N, P, 3), as their files had them."""
+        at = np.asarray(at)
+        rows, columns = np.divmod(at, self.size[1])
+        samples = np.empty((len(self.names), len(rows), 3), self.codes.dtype)
+        tiles = self._tiles(at)
+        wanted = np.unique(tiles)
+        for done, tile in enumerate(wanted):
             here = np.flatnonzero(tiles == tile)
             top, left = rows[here[0]] // _TILE * _TILE, columns[here[0]] // _TILE * _TILE
-            some = self._read((slice(None), slice(top, top + _TILE), slice(left, left + _TILE)))
-            radiance[:, here], clipped[:, here] = self._photograph(some[:, rows[here] - top, columns[here] - left])
-        return Photograph(radiance, clipped)
+            place = slice(top, top + _TILE), slice(left, left + _TILE)
+            for low in range(0, len(self.names), _GROUP):
+                some = slice(low, low + _GROUP)
+                samples[some, here] = self._read((some, *place))[:, rows[here] - top, columns[here] - left]
+            if progress is not None:
+                progress(done + 1, len(wanted))
+        return Raster(samples)
+
+    def parts(self, at: np.ndarray, most: int) -> Iterator[np.ndarray]:
+        at = np.asarray(at)
+        tiles = self._tiles(at)
+        order = np.argsort(tiles, kind="stable")
+        ends = np.flatnonzero(np.diff(tiles[order], append=-1)) + 1
+        low = 0
+        while low < len(at):
+            # As many whole tiles as fit, or where none does, a part of one.
+            fit = ends[(ends > low) & (ends <= low + most)]
+            high = int(fit[-1]) if fit.size else low + most
+            yield order[low:high]
+            low = high
+
+    def _tiles(self, at: np.ndarray) -> np.ndarray:
+        """Which tile each pixel lies in, (P,)."""
+        rows, columns = np.divmod(at, self.size[1])
+        tiles: np.ndarray = (rows // _TILE) * (self.size[1] // _TILE + 1) + columns // _TILE
+        return tiles
 
     def _read(self, where: tuple[slice, slice, slice]) -> np.ndarray:
         try:
@@ -75,9 +107,6 @@ class StoredPhotographs(Photographs):
         except Exception as error:  # a codec's or a checksum's, of whatever kind
             reason = " ".join(str(error).split())
             raise FileError(f"{self.path} is damaged ({reason:.120}): delete it and run gonio ingest again.") from error
-
-    def _photograph(self, codes: np.ndarray) -> Photograph:
-        return photograph(self.path, Raster(codes), self.encoding)
 
 
 def ingest(files: PhotographFiles, path: Path, progress: Callable[[int, int], None] | None = None) -> None:

@@ -24,7 +24,7 @@ from ..errors import MEMORY_LIMIT, AccuracyWarning, ArrayError, MemoryLimitError
 from ..lights.environment import Environment
 from ..lights.model import Beams, Light
 from ..lights.points import Lights
-from ..reflection import processors, radiance
+from ..reflection import processors, radiance, textured
 from ..shapes.view import Shape
 
 # Neighbouring pixels have neighbouring normals, so that a small tile leaves out nearly half the sky at once; with few
@@ -51,6 +51,8 @@ def render(
     out: np.ndarray | None = None,
 ) -> np.ndarray:
     """The radiance (rows, columns, 3), linear float32, that `camera` sees of `shape`.
+
+    Parameters of `material` that vary over two axes are textures of the shape's uv (`reflection.textured`).
 
     `shadows` traces whether the shape stands between its points and the light. `samples` is the most beams taken of
     the light for each ray; None takes what the material's narrowest lobe wants (`beams_wanted`), from 256 to 8,192.
@@ -129,6 +131,7 @@ def beams_wanted(material: BRDF) -> int:
     """
     k = np.arange(512)[:, None]
     u = (k * (0.8191725134, 0.6710436067, 0.5497004779)) % 1.0  # Roberts' sequence: even in three dimensions
+    material = textured(material, u[:, :2])  # of textures, a texel for each sample
     densest = 0.0
     for wo in (np.array([0.0, 0.0, 1.0]), np.array([math.sqrt(0.5), 0.0, math.sqrt(0.5)])):
         for lobe in material.lobes():
@@ -172,8 +175,9 @@ def _seen(
 
         sites = view.frames[m], view.wo[m], view.lifted[m]
         visibility = arriving if shadows else None
+        looked_up = textured(material, None if view.uv is None else view.uv[m])
         for source in sources:
-            colour[m] += radiance(material, source, *sites, visibility=visibility, budget=samples, threads=1)
+            colour[m] += radiance(looked_up, source, *sites, visibility=visibility, budget=samples, threads=1)
     return colour
 
 

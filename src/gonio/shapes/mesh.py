@@ -118,8 +118,15 @@ class Mesh(Shape):
     def trace(self, origins: Array, directions: Array) -> View:
         hits = self.scene.intersect(origins, directions)
         mask = hits.face >= 0
-        corner = self.faces[hits.face[mask]]
-        weight = hits.barycentric[mask][..., None]
+        wo = np.broadcast_to(-to_numpy(directions), (*mask.shape, 3))[mask]
+        return self.surface(mask, hits.face[mask], hits.barycentric[mask], wo, hits.distance[mask])
+
+    def surface(
+        self, mask: np.ndarray, face: np.ndarray, barycentric: np.ndarray, wo: np.ndarray, distance: np.ndarray
+    ) -> View:
+        """What lies on faces `face` (N,) at weights `barycentric` (N, 3), one for each True of `mask` (...), seen from
+        `wo` (N, 3) at `distance` (N,): normals that look just away from there are bent."""
+        corner, weight = self.faces[face], barycentric[..., None]
         corners, normals = self.vertices[corner], to_numpy(self.normals)[corner]
         position = (weight * corners).sum(axis=1)
         geometric = normalise(_across(corners))
@@ -127,7 +134,6 @@ class Mesh(Shape):
         normal = np.where(dot(normal, normal)[:, None] > 0, normal, geometric)
         # Faces wound against their given normals lie on the normals' side too.
         geometric = np.where(dot(geometric, normal)[:, None] < 0, -geometric, geometric)
-        wo = np.broadcast_to(-to_numpy(directions), (*mask.shape, 3))[mask]
         normal = _towards(normal, geometric, wo)
         below = np.maximum(dot(corners - position[:, None], normals), 0)[..., None]
         lifted = position + (weight * below * normals).sum(axis=1) + self.scene.clearance * geometric
@@ -140,7 +146,7 @@ class Mesh(Shape):
             tangent=self._tangent(corner, weight, normal),
             uv=None if self.uv is None else (weight * self.uv[corner]).sum(axis=1),
             wo=wo,
-            distance=hits.distance[mask],
+            distance=distance,
         )
 
     def occluded(self, origins: Array, directions: Array, distance: Array = np.inf) -> np.ndarray:

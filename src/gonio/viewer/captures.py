@@ -8,9 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from ..capture.mirror_ball import Circle
+from ..capture.circles import Circle
+from ..capture.lighting import arriving
 from ..capture.model import Capture
 from ..capture.photometric_stereo import Relief
+from ..capture.turntable import Turntable
+from ..directions import normalise
 from ..files.whole import writing
 from ..rendering.tonemap import clipped, tone_map
 from .plots import INK
@@ -19,15 +22,17 @@ _MOST = 30  # photographs on a sheet, evenly chosen
 _SIDE = 160  # pixels of one
 
 
-def contact_sheet(path: str | Path, capture: Capture) -> Path:
-    """Write a PNG of the photographs, all exposed alike, beside the directions of their lights seen from the camera."""
+def contact_sheet(path: str | Path, capture: Capture | Turntable) -> Path:
+    """Write a PNG of the photographs, all exposed alike, beside the directions of their lights, seen from +z: from the
+    camera, where it stands above. Of photographs from many places it is those of the cameras."""
     chosen = np.unique(np.linspace(0, len(capture.photographs) - 1, _MOST).astype(int))
     thumbs = [_thumb(capture.photographs.read(int(k)).radiance) for k in chosen]
     bright = float(np.quantile(np.stack([thumb.max(axis=2) for thumb in thumbs]), 0.98))
     across = math.ceil(math.sqrt(1.5 * len(thumbs)))
     down = math.ceil(len(thumbs) / across)
-    figure = _figure(1.15 * across + (4.4 if capture.directions is not None else 0.4), max(1.3 * down, 4.4))
-    parts = figure.add_gridspec(1, 2, width_ratios=(1.15 * across, 4.2)) if capture.directions is not None else None
+    title, towards = _towards(capture)
+    figure = _figure(1.15 * across + (4.4 if towards is not None else 0.4), max(1.3 * down, 4.4))
+    parts = figure.add_gridspec(1, 2, width_ratios=(1.15 * across, 4.2)) if towards is not None else None
     grid = (parts[0] if parts else figure.add_gridspec(1, 1)[0]).subgridspec(down, across, hspace=0.25, wspace=0.05)
     for place, k, thumb in zip(grid, chosen, thumbs, strict=False):
         axes = figure.add_subplot(place)
@@ -35,7 +40,7 @@ def contact_sheet(path: str | Path, capture: Capture) -> Path:
         axes.set_title(f"{k}", color=INK, fontsize=7, pad=2)
         axes.set_axis_off()
     if parts is not None:
-        _lights(figure.add_subplot(parts[1]), capture.directions, chosen)
+        _directions(figure.add_subplot(parts[1]), towards, chosen, title)
     return _save(figure, Path(path))
 
 
@@ -53,7 +58,7 @@ def ball_picture(
     left.set(xlim=(column - margin, column + margin), ylim=(row + margin, row - margin))
     left.set_title("outline and highlights", color=INK, fontsize=8)
     left.set_axis_off()
-    _lights(right, directions, np.arange(len(directions)))
+    _directions(right, directions, np.arange(len(directions)), "lights")
     return _save(figure, Path(path))
 
 
@@ -87,7 +92,19 @@ def relief_picture(path: str | Path, relief: Relief, heights: np.ndarray | None 
     return _save(figure, Path(path))
 
 
-def _lights(axes: Any, directions: Any, chosen: np.ndarray) -> None:
+def _towards(capture: Capture | Turntable) -> tuple[str, np.ndarray | None]:
+    """Where the lights stand, or the cameras: as seen from the middle of what is photographed, (N, 3)."""
+    if isinstance(capture, Turntable):
+        middle = np.zeros(3) if capture.shape is None else sum(capture.shape.bounds) / 2
+        return "cameras", normalise(np.stack([camera.towards(middle) for camera in capture.cameras]))
+    if capture.lights is None:
+        return "", None
+    near = "near lights" if capture.directions is None else "lights"
+    middle = np.nanmean(capture.positions[capture.mask], axis=0)[None]
+    return near, np.concatenate([arriving(light, middle).direction for light in capture.lights])
+
+
+def _directions(axes: Any, directions: Any, chosen: np.ndarray, title: str) -> None:
     """Directions in the unit disc, x right and y up; those behind the sample are hollow."""
     x, y, z = directions.T
     ring = np.linspace(0, 2 * math.pi, 181)
@@ -99,7 +116,7 @@ def _lights(axes: Any, directions: Any, chosen: np.ndarray) -> None:
     for k in chosen:
         axes.annotate(f"{k}", (x[k], y[k]), textcoords="offset points", xytext=(3, 2), color=INK, fontsize=6)
     axes.set(xlim=(-1.12, 1.12), ylim=(-1.12, 1.12), aspect="equal")
-    axes.set_title(f"{len(x)} lights, degrees from the camera", color=INK, fontsize=8)
+    axes.set_title(f"{len(x)} {title}, degrees from +z", color=INK, fontsize=8)
     axes.set_axis_off()
 
 

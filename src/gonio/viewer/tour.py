@@ -24,6 +24,7 @@ from ..brdf.ndf import GGX
 from ..brdf.ward import Ward
 from ..cameras import Orthographic, Pinhole, look_at
 from ..capture.integration import integrate_normals
+from ..capture.lighting import distant_lights
 from ..capture.photometric_stereo import photometric_stereo
 from ..capture.simulation import Sensor, simulate
 from ..directions import from_spherical, reflect
@@ -248,7 +249,7 @@ def _relief(folder: Path, _: Environment) -> Section:
     heights = 9 * np.exp(-4 * ((x - 0.3) ** 2 + y**2)) + 2.5 * np.sin(6 * x) * np.cos(5 * y)
     relief = HeightField(heights)
     k = np.arange(20)
-    lights = from_spherical(np.radians(15 + 2.5 * k), 2.4 * k)
+    lights = distant_lights(from_spherical(np.radians(15 + 2.5 * k), 2.4 * k), np.full(20, math.pi))
     material = Lambert([0.5, 0.35, 0.2]) + Microfacet(GGX(0.3), Fresnel(1.5))
     sensor = Sensor(exposure=1.2, gain=1e-4, read=1e-3, bits=8)
     capture = simulate(relief, material, lights, relief.camera(), sensor=sensor, shadows=True)

@@ -1,0 +1,441 @@
+"""gonio's own description of a capture: capture.toml beside the photographs.
+
+    version = 1
+    photographs = ["a.png", ...]          or [["a1.png", "a2.png"], ...], brackets of as many as exposures
+    exposures = [0.004, 0.016]            seconds, of brackets
+    encoding = "srgb" | "linear" | 2.2    or response = "response.toml"; else what the files state
+    vignetting = "vignetting.exr"         noise = {gain = 5e-5, read = 1e-3}
+    mask = "mask.png"                     normals = "normals.png"
+    shape = "flat"                        or a mesh, an image of heights in units of the world, whose samples are
+                                          `spacing` apart (else texel), or {centre = [x, y, z], radius = r}, a ball
+    cameras = "transforms.json"           photographs from many places, or COLMAP's; texels = [rows, columns] of uv
+    [camera]                              texel = 0.1 (straight above), with size and pose from elsewhere; or fx fy cx
+                                          cy size pose distortion; eye = [x, y, z]
+    [lights]                              directions or positions, intensities, axis, exponent, falloff
+
+Tables are lists of rows, one for each photograph. `directions` are unit; `positions` are near lights, in the unit of
+texel; `intensities` (R, G, B) are irradiances of the former, radiant intensities of the latter; `falloff` has the six
+coefficients of `Uneven`. Files lie in the description's folder or below.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import tomllib
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..arrays import to_numpy
+from ..cameras import Orthographic, Pinhole
+from ..capture.exposure import Noise
+from ..capture.lighting import distant_lights, near_lights
+from ..capture.model import Capture, above
+from ..capture.photographs import Flattened, Photographs
+from ..capture.turntable import Turntable
+from ..errors import FileError, GonioError
+from ..lights.model import Light
+from ..lights.points import Directional, Point
+from ..lights.uneven import Uneven
+from ..shapes.analytic import Sphere
+from ..shapes.heightfield import HeightField
+from ..shapes.mesh import Mesh
+from .brackets import BracketFiles
+from .camera_poses import read_cameras
+from .images import write_image
+from .layouts import Found, place_of, text_of
+from .meshes import write_mesh
+from .responses import write_response
+from .transforms import write_transforms
+from .whole import writing
+
+_COMPANIONS = ("mask", "normals")
+
+
+class _Fields:
+    """The fields of one table of a description, each taken once."""
+
+    def __init__(self, path: Path, fields: dict[str, Any], prefix: str = "") -> None:
+        self.path, self.fields, self.prefix = path, fields, prefix
+
+    def take(self, name: str, good: Callable[[Any], bool], wanted: str) -> Any:
+        """The value of a field, None where it is not there. Raises `FileError` where it is not `good`."""
+        value = self.fields.pop(name, None)
+        if value is not None and not good(value):
+            raise FileError(f"{self.path}: {self.prefix}{name} = {value!r:.60}; {wanted} is wanted.")
+        return value
+
+    def file(self, name: str) -> Path | None:
+        """A file of the description's folder that a field names."""
+        value = self.take(name, lambda v: isinstance(v, str), "the name of a file")
+        return None if value is None else self._place(name, value)
+
+    def table(self, name: str) -> _Fields:
+        value = self.take(name, lambda v: isinstance(v, dict), "a table") or {}
+        return _Fields(self.path, value, f"{name}.")
+
+    def rows(self, name: str, width: int, count: int | None) -> np.ndarray | None:
+        """A list of rows of numbers, as many as photographs where a count is given."""
+        value = self.take(name, lambda v: _is_rows(v, width), f"a list of rows of {width} numbers")
+        if value is None:
+            return None
+        if count is not None and len(value) != count:
+            raise FileError(f"{self.path}: {self.prefix}{name} has {len(value)} rows for {count} photographs.")
+        return np.array(value, dtype=np.float64)
+
+    def numbers(self, name: str, count: int | None = None) -> list[float] | None:
+        """A list of numbers, of a given length where there is one."""
+        wanted = "a list of numbers" if count is None else f"a list of {count} numbers"
+        value: list[float] | None = self.take(name, lambda v: _is_numbers(v) and count in (None, len(v)), wanted)
+        return value
+
+    def number(self, name: str) -> float | None:
+        value: float | None = self.take(name, _is_positive, "a positive number")
+        return value
+
+    def done(self) -> None:
+        """Raises `FileError` where a field is left: it is not known."""
+        for left in self.fields:
+            raise FileError(f"{self.path}: the field {self.prefix}{left} is not known.")
+
+    def _place(self, name: str, value: str) -> Path:
+        place = place_of(self.path.parent, value)
+        if place is None:
+            raise FileError(f"{self.path}: {self.prefix}{name} = {value!r} does not exist in its folder.")
+        return self.path.parent / place
+
+
+def read_description(path: Path) -> Found:
+    """What a capture.toml says. Raises `FileError` that names the field at fault."""
+    try:
+        fields = _Fields(path, tomllib.loads(text_of(path)))
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        raise FileError(f"{path} is no TOML: {error}.") from error
+    found, given = Found(path.parent, "capture.toml"), frozenset(fields.fields)
+    if fields.take("version", lambda v: v == 1, "1") is None:
+        raise FileError(f"{path} has no version; version = 1 is wanted.")
+    groups = fields.take("photographs", _is_names, "a list of names, or of brackets of names")
+    if groups is None:
+        raise FileError(f"{path} has no photographs.")
+    _radiometry(fields, found, groups)
+    for name in _COMPANIONS:
+        setattr(found, name, fields.file(name))
+    found.texels = fields.take("texels", _is_size, "[rows, columns]")
+    found.spacing = fields.number("spacing")
+    cameras = fields.file("cameras")
+    of_one = [name for name in (*_COMPANIONS, "camera") if name in given]
+    if cameras is not None and of_one:
+        raise FileError(f"{path}: {of_one[0]} goes with photographs from one place, not with cameras.")
+    if cameras is None and found.texels is not None:
+        raise FileError(f"{path}: texels go with cameras, photographs from many places.")
+    try:
+        _shape(fields, found)
+        _camera(fields.table("camera"), found)
+        found.lights = _lights(fields.table("lights"), len(groups))
+    except FileError:
+        raise
+    except GonioError as error:
+        raise FileError(f"{path}: {error}") from error
+    fields.done()
+    brackets = [[group] if isinstance(group, str) else group for group in groups]
+    if cameras is not None:
+        found.cameras = _cameras(path, cameras, [group[0] for group in brackets])
+    places = [[place_of(path.parent, name) for name in group] for group in brackets]
+    lost = [
+        name for group, at in zip(brackets, places, strict=True) for name, p in zip(group, at, strict=True) if not p
+    ]
+    if lost:
+        found.defects.append(f"{', '.join(lost[:5])} does not exist in its folder")
+    found.names = [tuple(place or "" for place in group) for group in places]
+    found.keep(np.array([None not in group for group in places]))
+    return found
+
+
+def write_capture(folder: str | os.PathLike[str], capture: Capture | Turntable) -> Path:
+    """Write capture.toml beside photographs that lie in `folder` already. Answers its path.
+
+    Beside it come the files that it names: shape.obj or heights.exr, transforms.json of many cameras, response.toml and
+    vignetting.exr. mask.png and normals.png are named where they lie there. Raises `FileError` for photographs that do
+    not lie there, lights of several kinds, and shapes other than meshes, heights and spheres.
+    """
+    folder = Path(folder)
+    for name in capture.photographs.names:
+        if place_of(folder, name) is None:
+            raise FileError(f"{folder} has no photograph {name}: a capture is written beside its photographs.")
+    lines = ["version = 1", *_photograph_lines(folder, capture.photographs)]
+    if isinstance(capture, Turntable):
+        if not all(isinstance(camera, Pinhole) for camera in capture.cameras):
+            raise FileError(f"{folder}: cameras without perspective are not written.")
+        write_transforms(folder / "transforms.json", dict(zip(capture.photographs.names, capture.cameras, strict=True)))  # type: ignore[arg-type]
+        lines.append('cameras = "transforms.json"')
+        lines += [f"texels = {list(capture.texels)}"] if capture.texels else []
+    else:
+        for name in _COMPANIONS:
+            if (folder / f"{name}.png").exists():
+                lines.append(f'{name} = "{name}.png"')
+    lines += _shape_lines(folder, capture)
+    if isinstance(capture, Capture):
+        lines += _camera_lines(capture)
+    if capture.lights is not None:
+        lines += _light_lines(folder, capture.lights)
+    path = folder / "capture.toml"
+    with writing(path) as temporary:
+        temporary.write_text("\n".join(lines) + "\n", "utf-8")
+    return path
+
+
+def _radiometry(fields: _Fields, found: Found, groups: list[Any]) -> None:
+    """exposures, encoding, response, vignetting, noise."""
+    path = fields.path
+    exposures = fields.numbers("exposures")
+    sizes = {1 if isinstance(group, str) else len(group) for group in groups}
+    wanted = 1 if exposures is None else len(exposures)
+    if sizes != {wanted}:
+        raise FileError(
+            f"{path}: brackets have {' and '.join(map(str, sorted(sizes)))} photographs, exposures are {wanted}."
+            if exposures is not None
+            else f"{path}: photographs are brackets, but there are no exposures; seconds of each are wanted."
+        )
+    found.times = None if exposures is None else tuple(exposures)
+    found.encoding = fields.take("encoding", _is_encoding, "'srgb', 'linear' or a power")
+    found.response, found.vignetting = fields.file("response"), fields.file("vignetting")
+    noise = fields.take("noise", lambda v: isinstance(v, dict), "a table")
+    if found.response is not None and (found.encoding is not None or exposures is None):
+        raise FileError(f"{path}: response goes with exposures, in the place of encoding.")
+    if noise is not None:
+        table = _Fields(path, noise, "noise.")
+        gain, read = table.number("gain"), table.take("read", lambda v: v == 0 or _is_positive(v), "a number >= 0")
+        table.done()
+        if exposures is None or gain is None:
+            raise FileError(f"{path}: noise goes with exposures, and has a gain.")
+        found.noise = Noise(gain, read or 0.0)
+
+
+def _shape(fields: _Fields, found: Found) -> None:
+    shape = fields.take("shape", lambda v: isinstance(v, str | dict), "'flat', the name of a file or a ball")
+    found.flat = shape == "flat"
+    if isinstance(shape, dict):
+        ball = _Fields(fields.path, shape, "shape.")
+        centre, radius = ball.numbers("centre", 3), ball.number("radius")
+        ball.done()
+        if centre is None or radius is None:
+            raise FileError(f"{fields.path}: a ball as shape has a centre and a radius.")
+        found.shape = Sphere(centre, radius)
+    elif shape not in (None, "flat"):
+        found.shape = fields._place("shape", shape)
+
+
+def _camera(camera: _Fields, found: Found) -> None:
+    eye = camera.numbers("eye", 3)
+    found.eye = None if eye is None else tuple(eye)
+    texel = camera.number("texel")
+    found.texel = 1.0 if texel is None else texel
+    lens = {name: camera.number(name) for name in ("fx", "fy")}
+    middle = {name: camera.take(name, _is_number, "a number") for name in ("cx", "cy")}
+    size = camera.take("size", _is_size, "[rows, columns]")
+    distortion, pose = camera.numbers("distortion", 5), camera.rows("pose", 4, None)
+    camera.done()
+    given = [*lens.values(), *middle.values(), size, pose]
+    if texel is not None and size is not None and pose is not None and not any((*given[:4], distortion)):
+        found.camera = Orthographic(pixel=texel, size=tuple(size), pose=pose)
+    elif any(value is not None for value in (*given, distortion)):
+        if texel is not None or any(value is None for value in given):
+            raise FileError(
+                f"{camera.path}: a camera is either texel, with size and pose where it is not straight above, or fx, "
+                "fy, cx, cy, size and pose, and distortion where there is any."
+            )
+        if distortion is not None:
+            lens["distortion"] = tuple(distortion)  # type: ignore[assignment]
+        found.camera = Pinhole(size=tuple(size), pose=pose, **lens, **middle)  # type: ignore[arg-type]
+
+
+def _lights(lights: _Fields, count: int) -> tuple[Light, ...] | None:
+    directions, positions = lights.rows("directions", 3, count), lights.rows("positions", 3, count)
+    intensities = lights.rows("intensities", 3, count)
+    falloff = lights.take("falloff", _is_falloff, "a list of one or three rows of 6 numbers for each light")
+    axis = lights.numbers("axis", 3)
+    exponent = lights.take("exponent", lambda v: v == 0 or _is_positive(v), "a number >= 0")
+    lights.done()
+    if directions is not None and positions is not None:
+        raise FileError(f"{lights.path}: lights have directions or positions, not both.")
+    if positions is None and (axis is not None or exponent is not None):
+        raise FileError(f"{lights.path}: lights.axis and exponent go with positions.")
+    if directions is not None:
+        found = distant_lights(directions, intensities)
+    elif positions is not None:
+        found = near_lights(positions, intensities, axis, 1.0 if exponent is None else exponent)
+    elif intensities is not None or falloff is not None:
+        raise FileError(f"{lights.path}: lights have neither directions nor positions.")
+    else:
+        return None
+    if falloff is None:
+        return found
+    if len(falloff) != count:
+        raise FileError(f"{lights.path}: lights.falloff has {len(falloff)} rows for {count} photographs.")
+    return tuple(Uneven(light, np.array(rows, dtype=np.float64)) for light, rows in zip(found, falloff, strict=True))
+
+
+def _cameras(path: Path, file: Path, names: list[str]) -> tuple[Pinhole, ...]:
+    """The camera of each photograph, by its path or its name alone."""
+    cameras = read_cameras(file)
+    stems = Counter(Path(name).stem for name in cameras)
+    by_name = {Path(name).stem: camera for name, camera in cameras.items()}
+    for name in names:
+        if name not in cameras and stems[Path(name).stem] != 1:
+            many = "several cameras" if Path(name).stem in stems else "no camera"
+            raise FileError(f"{path}: {name} has {many} in {file.name}.")
+    return tuple(cameras[name] if name in cameras else by_name[Path(name).stem] for name in names)
+
+
+def _photograph_lines(folder: Path, photographs: Photographs) -> list[str]:
+    """Names, and what their codes mean."""
+    vignetting = None
+    if isinstance(photographs, Flattened):
+        vignetting, photographs = photographs.vignetting, photographs.photographs
+    if not isinstance(photographs, BracketFiles):
+        lines = ["photographs = [", *(f"    {_quoted(name)}," for name in photographs.names), "]"]
+    else:
+        times = len(photographs.times)
+        files = [photographs.files.names[k : k + times] for k in range(0, len(photographs.files.names), times)]
+        lines = ["photographs = [", *(f"    [{', '.join(map(_quoted, group))}]," for group in files), "]"]
+        noise, vignetting = photographs.noise, photographs.vignetting
+        lines.append(f"exposures = {_row(photographs.times)}")
+        lines.append(f"noise = {{gain = {noise.gain:.9g}, read = {noise.read:.9g}}}")
+        if photographs.given:
+            write_response(folder / "response.toml", photographs.response)
+            lines.append('response = "response.toml"')
+    encoding = getattr(photographs, "encoding", None)
+    if encoding is not None:
+        lines.append(f"encoding = {_quoted(encoding) if isinstance(encoding, str) else float(encoding)}")
+    if vignetting is not None:
+        write_image(folder / "vignetting.exr", np.broadcast_to(vignetting, (*vignetting.shape[:2], 3)))
+        lines.append('vignetting = "vignetting.exr"')
+    return lines
+
+
+def _shape_lines(folder: Path, capture: Capture | Turntable) -> list[str]:
+    shape = capture.shape
+    if isinstance(shape, Mesh):
+        write_mesh(folder / "shape.obj", shape)
+        return ['shape = "shape.obj"']
+    if isinstance(shape, HeightField):
+        write_image(folder / "heights.exr", np.repeat(np.asarray(shape.heights)[..., None], 3, axis=2))
+        return ['shape = "heights.exr"', f"spacing = {shape.spacing:.12g}"]
+    if isinstance(shape, Sphere):
+        return [f"shape = {{centre = {_row(to_numpy(shape.centre).tolist())}, radius = {shape.radius:.9g}}}"]
+    if shape is not None:
+        raise FileError(f"{folder}: a {type(shape).__name__} is not written; meshes, heights and spheres are.")
+    if isinstance(capture, Capture) and capture.normals is not None:
+        flat = np.all(capture.normals[capture.mask] == (0, 0, 1)) and not (folder / "normals.png").exists()
+        return ['shape = "flat"'] if flat else []
+    return []
+
+
+def _camera_lines(capture: Capture) -> list[str]:
+    camera, lines = capture.camera, []
+    if isinstance(camera, Orthographic) and (camera.pixel != 1 or not _is_above(capture)):
+        lines.append(f"texel = {camera.pixel:.12g}")
+    if isinstance(camera, Pinhole):
+        lines += [f"{name} = {getattr(camera, name):.12g}" for name in ("fx", "fy", "cx", "cy")]
+        lines.append(f"distortion = {_row(camera.distortion)}")
+    if not _is_above(capture):
+        lines += [f"size = {list(camera.size)}", *_table("pose", camera.pose)]
+    if capture.eye is not None:
+        lines.append(f"eye = {_row(capture.eye.tolist())}")
+    return ["", "[camera]", *lines] if lines else []
+
+
+def _is_above(capture: Capture) -> bool:
+    """Whether the camera is the one that stands above where nothing else is said."""
+    camera = capture.camera
+    if not isinstance(camera, Orthographic):
+        return False
+    usual = above(camera.size, camera.pixel)
+    # How high it stands matters only to what reaches higher.
+    low = capture.shape is None or capture.shape.bounds[1][2] < usual.position[2]
+    return low and np.allclose(camera.pose[:2], usual.pose[:2], atol=1e-12) and camera.pose[2, 2] < 0
+
+
+def _light_lines(folder: Path, lights: tuple[Light, ...]) -> list[str]:
+    lines = ["", "[lights]"]
+    bare = [light.light if isinstance(light, Uneven) else light for light in lights]
+    distant = [light for light in bare if isinstance(light, Directional)]
+    near = [light for light in bare if isinstance(light, Point)]
+    if len(distant) == len(lights):
+        lines += _table("directions", [light.direction for light in distant])
+        strengths = [light.irradiance for light in distant]
+    elif len(near) == len(lights):
+        lines += _table("positions", [light.position for light in near])
+        strengths = [light.intensity for light in near]
+        axes = {None if light.axis is None else tuple(to_numpy(light.axis).tolist()) for light in near}
+        exponents = {light.exponent for light in near}
+        if len(axes) > 1 or len(exponents) > 1:
+            raise FileError(f"{folder}: lights with several axes or exponents are not written.")
+        if None not in axes:
+            lines += [f"axis = {_row(axes.pop())}", f"exponent = {exponents.pop():.9g}"]
+    else:
+        raise FileError(f"{folder}: distant and near lights in one capture are not written.")
+    colours = np.array([np.broadcast_to(to_numpy(strength), 3) for strength in strengths])
+    if not np.all(colours == 1):
+        lines += _table("intensities", colours)
+    uneven = [light for light in lights if isinstance(light, Uneven)]
+    if uneven and len(uneven) < len(lights):
+        raise FileError(f"{folder}: some lights have a measured falloff and others have none.")
+    if uneven:
+        lines.append("falloff = [")
+        lines += [f"    [{', '.join(_row(row) for row in to_numpy(light.falloff).tolist())}]," for light in uneven]
+        lines.append("]")
+    return lines
+
+
+def _table(name: str, rows: Any) -> list[str]:
+    return [f"{name} = [", *(f"    {_row(to_numpy(row).tolist())}," for row in rows), "]"]
+
+
+def _row(numbers: Any) -> str:
+    return f"[{', '.join(f'{x:.9g}' for x in numbers)}]"
+
+
+def _is_names(value: Any) -> bool:
+    def is_group(x: Any) -> bool:
+        return isinstance(x, str) or (isinstance(x, list) and bool(x) and all(isinstance(n, str) for n in x))
+
+    return isinstance(value, list) and bool(value) and all(map(is_group, value))
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= sys.float_info.max
+
+
+def _is_positive(value: Any) -> bool:
+    return _is_number(value) and value > 0
+
+
+def _is_encoding(value: Any) -> bool:
+    return value in ("srgb", "linear") or _is_positive(value)
+
+
+def _is_numbers(value: Any) -> bool:
+    return isinstance(value, list) and all(map(_is_number, value))
+
+
+def _is_rows(value: Any, width: int) -> bool:
+    return isinstance(value, list) and all(_is_numbers(row) and len(row) == width for row in value)
+
+
+def _is_falloff(value: Any) -> bool:
+    return isinstance(value, list) and all(_is_rows(rows, 6) and len(rows) in (1, 3) for rows in value)
+
+
+def _is_size(value: Any) -> bool:
+    return isinstance(value, list) and len(value) == 2 and all(isinstance(n, int) and n > 0 for n in value)
+
+
+def _quoted(text: str) -> str:
+    """A TOML string."""
+    escaped = "".join(c if c.isprintable() and c not in '"\\' else f"\\U{ord(c):08x}" for c in text)
+    return f'"{escaped}"'
