@@ -48,13 +48,14 @@ def test_a_white_target_gives_back_near_lights_whose_light_falls_off_across_it()
     target = white(gn.near_lights(PLACES, POWERS), gn.near_lights(PLACES))
     image = target.photographs.read(2).radiance
     assert image.max() / image.min() > 2
-    assert_allclose(powers(lights_of_white(target, 0.9)), POWERS, rtol=1e-6)
+    # The simulation lights where shadow rays start: 1e-4 of a texel above the target, whose lamps are at 60.
+    assert_allclose(powers(lights_of_white(target, 0.9)), POWERS, rtol=1e-5)
 
 
 def test_strengths_that_were_told_are_corrected():
     told = gn.near_lights(PLACES, [2.0, 3.0, 4.0], axis=[0, 0, -1.0], exponent=2)
     target = white(gn.near_lights(PLACES, POWERS, axis=[0, 0, -1.0], exponent=2), told)
-    assert_allclose(powers(lights_of_white(target, 0.9)), POWERS, rtol=1e-6)
+    assert_allclose(powers(lights_of_white(target, 0.9)), POWERS, rtol=1e-5)
 
 
 def test_a_white_target_need_not_be_flat():
@@ -81,7 +82,7 @@ def test_patches_of_known_colours_give_the_lights_and_what_is_not_known_does_not
         assert_allclose(powers(lights_of_white(target, albedo)), powers(lights), rtol=tolerance)
 
 
-def test_a_falloff_is_found_with_the_strength_in_the_middle(rng):
+def test_a_falloff_is_found_with_the_strength_in_the_middle():
     for make, where in ((gn.distant_lights, TOWARDS), (gn.near_lights, PLACES)):
         lights = [Uneven(light, FALLOFF) for light in make(where, POWERS)]
         target = white(lights, make(where))
@@ -112,25 +113,23 @@ def test_a_falloff_that_was_told_is_corrected():
         at = target.positions[target.mask]
         assert_allclose(arriving(found, at).irradiance, arriving(true, at).irradiance, rtol=1e-5)
     # And where it is right, it is kept.
-    told = [dataclasses.replace(light, light=light.light.__class__(light.light.direction)) for light in lights]
+    told = [Uneven(light, FALLOFF) for light in gn.distant_lights(TOWARDS)]
     for found, true in zip(lights_of_white(dataclasses.replace(target, lights=told), 0.9), lights, strict=True):
         assert_allclose(found.falloff, true.falloff)
         assert_allclose(found.light.irradiance, true.light.irradiance, rtol=1e-6)
 
 
-def test_a_falloff_is_as_well_known_far_from_the_middle(rng):
-    # 2,000 texels away, squares are 4e6 +- 6e4: not centred, seven digits of a photograph would be lost in them.
-    y, x = np.mgrid[:30, :30].astype(float)
-    at = np.stack((x + 2000, y + 3000, np.zeros_like(x)), axis=-1)
-    camera = gn.Orthographic(
-        pixel=1.0, size=(30, 30), pose=gn.look_at([2015.0, 3015, 100], [2015.0, 3015, 0], [0, 1.0, 0])
-    )
-    scene = gn.Capture(Held(np.ones((1, 30, 30, 3))), gn.distant_lights([[0.0, 0, 1]]), camera=camera)
-    at = scene.positions
-    true = Uneven(gn.Directional([0.0, 0, 1]), [[0, 1e-3, -1e-3, -2e-7, 0, 1e-7]])
-    image = arriving(true, at.reshape(-1, 3)).irradiance.reshape(30, 30, -1) / math.pi * np.ones(3)
-    (found,) = lights_of_white(dataclasses.replace(scene, photographs=Held(image[None])), falloff=True)
-    assert_allclose(arriving(found, at[scene.mask]).irradiance * np.ones(3), image[scene.mask] * math.pi, rtol=1e-6)
+def test_a_falloff_is_as_well_known_far_from_the_middle():
+    # 3,000 texels away, squares are 9e6 +- 1e5: not centred, the seven digits of a photograph would be lost in them.
+    middle = np.array([2015.0, 3015, 0])
+    camera = gn.Orthographic(pixel=1.0, size=(30, 30), pose=gn.look_at(middle + [0, 0, 100], middle, [0, 1.0, 0]))
+    up = gn.distant_lights([[0.0, 0, 1]])
+    scene = gn.Capture(Held(np.ones((1, 30, 30, 3))), up, camera=camera)
+    at = scene.positions[scene.mask]
+    true = Uneven(up[0], [[0, 1e-3, -1e-3, -2e-7, 0, 1e-7]])
+    image = (arriving(true, at).irradiance / math.pi * np.ones(3)).reshape(1, 30, 30, 3)
+    (found,) = lights_of_white(dataclasses.replace(scene, photographs=Held(image)), falloff=True)
+    assert_allclose(arriving(found, at).irradiance, arriving(true, at).irradiance * np.ones(3), rtol=1e-6)
 
 
 def test_with_its_lights_known_a_capture_tells_the_brdf_in_its_units():

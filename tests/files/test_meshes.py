@@ -114,3 +114,41 @@ def test_what_is_no_mesh_is_refused_by_name(tmp_path, name, text, message):
         gn.read_mesh(tmp_path / name)
     with pytest.raises(FileError, match="does not exist"):
         gn.read_mesh(tmp_path / "none.obj")
+
+
+SMALL = gn.vase(12)
+WRITTEN = {
+    "with uv": SMALL,
+    "without": gn.Mesh(SMALL.vertices, SMALL.faces),
+    "of facets": gn.Mesh(
+        SMALL.vertices[SMALL.faces[:90]].reshape(-1, 3),
+        np.arange(270).reshape(-1, 3),
+        normals=np.repeat(np.cross([[1.0, 2, 3]], SMALL.vertices[:90] + 2), 3, axis=0),
+    ),
+    "far away": gn.Mesh(SMALL.vertices + [4e5, -5e6, 100], SMALL.faces, SMALL.uv, SMALL.normals),
+}
+
+
+@pytest.mark.parametrize("name", WRITTEN)
+def test_meshes_come_back_as_they_were_written(tmp_path, name):
+    mesh = WRITTEN[name]
+    gn.write_mesh(tmp_path / "a.obj", mesh)
+    again = gn.read_mesh(tmp_path / "a.obj")
+    # Vertices keep their order; those that no face has are left out.
+    used = np.unique(mesh.faces)
+    np.testing.assert_array_equal(used[again.faces], mesh.faces)
+    size = np.ptp(mesh.vertices, axis=0).max()
+    np.testing.assert_allclose(again.vertices, mesh.vertices[used], rtol=0, atol=1e-8 * size)
+    np.testing.assert_allclose(again.normals, mesh.normals[used], atol=1e-8)
+    assert (again.uv is None) == (mesh.uv is None)
+    if mesh.uv is not None:
+        np.testing.assert_allclose(again.uv, mesh.uv[used], atol=1e-8)
+
+
+def test_meshes_are_written_as_obj_alone_and_whole_or_not_at_all(tmp_path):
+    for name, message in (("a.ply", r"written as \.obj, not \.ply"), ("a", "not without suffix")):
+        with pytest.raises(FileError, match=message):
+            gn.write_mesh(tmp_path / name, SMALL)
+    with pytest.raises(FileError, match=r"nowhere"):
+        gn.write_mesh(tmp_path / "nowhere" / "a.obj", SMALL)
+    assert list(tmp_path.iterdir()) == []

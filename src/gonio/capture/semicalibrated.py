@@ -49,8 +49,9 @@ class Strengths:
     each channel: one factor a channel, a white balance, cannot be known.
 
     converged: whether they came to rest and may be trusted; `reason` says why not, and is empty otherwise. error: (N,),
-    standard error of the logarithms as residuals scatter, were they independent. doubt: relative rms by which strengths
-    may be off all the same, since objects are not quite matte: more, the flatter the object.
+    standard error of the logarithms as residuals scatter, were pixels independent; what counts is chosen by the same
+    noise, so that they scatter up to twice as much. doubt: relative rms by which strengths may be off all the same,
+    since objects are not quite matte: more, the flatter the object.
     """
 
     lights: tuple[Light, ...]
@@ -94,7 +95,7 @@ def estimate_strengths(capture: Capture, progress: Callable[[int, int], None] | 
         while change >= _CLOSE:
             s, fit, change = _round(pixels, s, names)
             rounds += 1
-            strayed = float(np.std(np.log(s / first)))
+            strayed = float(np.std(np.log(s.mean(axis=1) / first.mean(axis=1))))
             if rounds == _ROUNDS or strayed > max(_ASTRAY, first_fit.doubt):
                 raise ArrayError(f"normals and strengths did not come to rest in {rounds} rounds.")
     except ArrayError as error:
@@ -133,7 +134,7 @@ class _Pixels:
             direction, irradiance, _ = arriving(light, places)
             if distant is None:
                 towards[..., k] = direction
-            lit = (irradiance > 0).all(axis=1)
+            lit = np.asarray((irradiance > 0).all(axis=1))
             radiance[k] /= np.where(lit[:, None], irradiance, 1)
             clipped[k] |= ~lit
         return _Pixels(radiance, clipped, towards)
@@ -164,7 +165,8 @@ def _first_counted(values: np.ndarray, clipped: np.ndarray, names: tuple[str, ..
     if not (bright > 0).all():
         raise ArrayError(f"{names[int(np.argmin(bright))]} is black. Was the light on?")
     relative = values / bright
-    top = np.quantile(relative, 0.9, axis=1, keepdims=True)
+    n = values.shape[1]
+    top = np.partition(relative, n - 1 - n // 10, axis=1)[:, n - 1 - n // 10, None]
     counted = (relative > _DARK * top) & (relative <= top) & ~clipped
     return np.asarray(counted & (top > _BLACK * np.quantile(top, 0.9)))
 
@@ -172,25 +174,24 @@ def _first_counted(values: np.ndarray, clipped: np.ndarray, names: tuple[str, ..
 def _round(pixels: _Pixels, s: np.ndarray, names: tuple[str, ...]) -> tuple[np.ndarray, _Fit, float]:
     """Better strengths, from the normals and the colours that s give, their fit, and by how much they changed."""
     values = pixels.values(s, pixels.clipped)
-    count, n = values.shape
+    count = len(values)
     g, albedo = np.empty((count, 3)), np.empty((count, 3))
-    counts, residual, error = np.empty((count, n), np.uint8), np.empty(count), np.empty(count)
+    counts, residual, error = np.empty(values.shape, np.uint8), np.empty(count), np.empty(count)
     kernels.solve(values, pixels.towards, True, g, counts, residual, error)
     kernels.colour(pixels.radiance, 0, 1 / s, pixels.towards, g, counts, albedo)
     counted = counts > 0
     fit = _fit(np.where(counted, values, 0), counted, pixels.towards, names)
     now = s / fit.e[:, None]
-    length = np.linalg.norm(g, axis=1)
-    for k in range(n):
-        at = counted[:, k] & (albedo > 0).all(axis=1)
-        towards = pixels.towards[at if len(pixels.towards) > 1 else slice(None), :, k]
-        foreseen = albedo[at] * (np.sum(g[at] * towards, axis=1) / length[at])[:, None]
-        seen = pixels.radiance[k, at] / s[k]
+    n = g / np.linalg.norm(g, axis=1, keepdims=True)
+    for k, name in enumerate(names):
+        cosine = np.sum(n * pixels.towards[..., k], axis=1)
+        at = counted[:, k] & (cosine > 0) & (albedo > 0).all(axis=1)
+        foreseen, seen = albedo[at] * cosine[at, None], pixels.radiance[k, at] / s[k]
         colour = np.zeros(3)
-        if len(seen):
+        if at.any():
             colour[:] = [weighted_median(seen[:, c] / foreseen[:, c], foreseen[:, c]) for c in range(3)]
         if not (colour > 0).all():
-            raise ArrayError(f"{names[k]} lacks a colour that the others show.")
+            raise ArrayError(f"{name} lacks a colour that the others show.")
         # Channels relative to each other only: the fit knows their mean best.
         now[k] *= colour / colour.mean()
     now = _normalised(now)
@@ -204,7 +205,7 @@ def _fit(values: np.ndarray, counted: np.ndarray, towards: np.ndarray, names: tu
     """
     n = values.shape[1]
     sent, explained = np.zeros(n), np.zeros((n, n))
-    telling, spare = np.zeros(n, np.intp), 1 - n
+    telling, parts = np.zeros(n, np.intp), []
     step = max(_BLOCK // n, 1)
     for low in range(0, len(values), step):
         some = slice(low, low + step)
@@ -216,11 +217,10 @@ def _fit(values: np.ndarray, counted: np.ndarray, towards: np.ndarray, names: tu
         l, w, v = l[good], w[good], w[good] * values[some][good]
         v /= np.sqrt(np.sum(v * v, axis=1) / w.sum(axis=1))[:, None]
         across = np.swapaxes(axes[good], 1, 2) @ l * (v[:, None] / np.sqrt(turning[good])[..., None])
-        flat = across.reshape(-1, n)
-        explained += flat.T @ flat
+        explained += np.tensordot(across, across, axes=((0, 1), (0, 1)))
         sent += np.sum(v * v, axis=0)
         telling += w.sum(axis=0).astype(np.intp)
-        spare += int(w.sum()) - 3 * len(w)
+        parts.append((v, across))
     if telling.min() < _TELLING:
         k = int(np.argmin(telling))
         raise ArrayError(
@@ -229,7 +229,8 @@ def _fit(values: np.ndarray, counted: np.ndarray, towards: np.ndarray, names: tu
     root = np.sqrt(sent)
     left, vectors = np.linalg.eigh(np.eye(n) - explained / np.outer(root, root))
     left = left.clip(0)
-    least, gap = left[0], left[1] - left[0]
+    least, gaps = left[0], left[1:] - left[0]
+    gap = gaps[0]
     if not (left[1] > _OPEN and least < gap):
         raise ArrayError(
             "the object leaves the lights' strengths open: it is flat, or not matte, or all lights but one lie in a "
@@ -239,12 +240,15 @@ def _fit(values: np.ndarray, counted: np.ndarray, towards: np.ndarray, names: tu
     e = e * np.sign(e.sum())
     if not (e > 0).all():
         raise ArrayError(f"{names[int(np.argmin(e))]} does not fit the others: is its light where it is told to be?")
-    # Var(log e) = s^2 (E (M - a D) E)^+, in which the mean of log e is not free; s^2 by the degrees of freedom.
-    ends = vectors[:, 1:] / np.sqrt(left[1:] - least)
-    deviations = ends / (root * e)[:, None]
-    deviations = deviations - deviations.mean(axis=0)
-    variance = least * float(sent @ (e * e)) / max(spare, 1)
-    return _Fit(e, np.sqrt(variance * np.sum(deviations**2, axis=1)), math.sqrt(least / gap))
+    # H = E (M - a D) E, log e off by H^+ times the sum over pixels of what each pulls it by: E (M_p - a D_p) e.
+    pulls = np.zeros((n, n))
+    for v, across in parts:
+        pull = e * ((1 - least) * v * v * e - np.einsum("pin,pi->pn", across, across @ e))
+        pulls += pull.T @ pull
+    ends = vectors[:, 1:] / (root * e)[:, None]
+    spread = ends / gaps @ ends.T
+    spread -= spread.mean(axis=0)
+    return _Fit(e, np.sqrt(np.diag(spread @ pulls @ spread.T)), math.sqrt(least / gap))
 
 
 def _normalised(s: np.ndarray) -> np.ndarray:

@@ -43,7 +43,7 @@ def lights_of_white(target: Capture, albedo: Array = 1.0, falloff: bool = False)
     if target.lights is None:
         raise ArrayError("the target's lights are unknown: give them, as distant_lights(directions).")
     rho = _albedo(albedo, target)
-    used = np.isfinite(rho).all(axis=-1)
+    used = np.isfinite(rho).all(axis=1)
     positions = target.positions[target.mask]
     normals = np.array([0.0, 0.0, 1.0]) if target.normals is None else target.normals[target.mask].astype(np.float64)
     return tuple(
@@ -74,7 +74,7 @@ def _found(
         raise ArrayError(f"{name}: {np.mean(clipped[used]):.0%} of the white is clipped: expose less.")
     lit &= ~clipped
     seen = radiance[lit].astype(np.float64)
-    foreseen = np.broadcast_to(rho, light.irradiance.shape)[lit] / math.pi * light.irradiance[lit] * cosine[lit, None]
+    foreseen = rho[lit] / math.pi * light.irradiance[lit] * cosine[lit, None]
     strength = np.array([weighted_median(seen[:, c] / foreseen[:, c], foreseen[:, c]) for c in range(3)])
     if not np.all(strength > 0):
         raise ArrayError(f"{name}: the white is black. Was the light on?")
@@ -143,14 +143,13 @@ def _in_world(a: np.ndarray, x0: float, y0: float, extent: float) -> np.ndarray:
 
 
 def _albedo(albedo: Array, target: Capture) -> np.ndarray:
-    """(1, 3), or (S, 3) on the mask, NaN where not to be used."""
+    """(S, 3) on the mask, NaN where not to be used."""
     rho = to_numpy(albedo).astype(np.float64)
     size = target.mask.shape
     if rho.shape not in ((), (3,), (*size, 3)):
         raise ParameterError(f"albedo has shape {rho.shape}; a number, (3,) or {(*size, 3)} is wanted.")
-    patches = rho.ndim == 3
-    rho = rho[target.mask] if patches else np.broadcast_to(rho, (1, 3))
-    known = rho[np.isfinite(rho).all(axis=-1)] if patches else rho
+    rho = np.broadcast_to(rho, (*size, 3))[target.mask]
+    known = rho[np.isfinite(rho).all(axis=1)]
     if not known.size:
         raise ParameterError("albedo is NaN everywhere on the mask: no pixel is left to tell the lights.")
     if not np.all((known > 0) & (known <= 1)):

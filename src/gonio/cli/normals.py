@@ -29,11 +29,12 @@ def normals(
 
     import gonio as gn
     from gonio.capture.near_stereo import heights_of, near_photometric_stereo
+    from gonio.errors import ParameterError
     from gonio.files.whole import writable
     from gonio.viewer.captures import relief_picture
 
     if falloff and not white:
-        raise gn.GonioError("--falloff is told from a white target: give --white.")
+        raise ParameterError("--falloff is told from a white target: give --white.")
     scene = captures.read(capture, encoding, partial, lights)
     if white:
         from gonio.capture.white import lights_of_white

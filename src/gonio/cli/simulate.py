@@ -73,14 +73,13 @@ def simulate(
     sensor = gn.Sensor(exposure, gain, read, bits)
     capture = _captured(solid, material, arriving, views, size, sensor, shadows, misaligned, seed, centre, radius)
     (output / "truth").mkdir(parents=True)
-    _write(output, capture, [dataclasses.replace(sensor, exposure=exposure * m) for m in multiples])
+    names = _write(output, capture, [dataclasses.replace(sensor, exposure=exposure * m) for m in multiples])
     made = {"shape": shape, "brdf": brdf, "sensor": dataclasses.asdict(sensor), "shadows": shadows, "seed": seed}
     (output / "truth" / "made.json").write_text(json.dumps(made, indent=1), "utf-8")
     if ideal.directions is not None:
-        gn.write_lp(output / "truth" / "dirs.lp", capture.photographs.names, ideal.directions)
+        gn.write_lp(output / "truth" / "dirs.lp", names, ideal.directions)
         if not views:
-            first = gn.read_capture(output).photographs.names
-            gn.write_lp(output / "dirs.lp", first, np.asarray(capture.directions))
+            gn.write_lp(output / "dirs.lp", names, np.asarray(capture.directions))
     rows, columns = capture.photographs.size
     typer.echo(f"{len(capture.photographs)} photographs of {columns} x {rows} in {output}")
 
@@ -155,8 +154,11 @@ def _brightest(ideal: Capture | Turntable) -> float:
     return bright if bright > 0 else 1.0
 
 
-def _write(output: Path, capture: Capture | Turntable, sensors: list[Sensor]) -> None:
-    """Photographs by each of the sensors, normals and mask where they are of one place, and what describes them."""
+def _write(output: Path, capture: Capture | Turntable, sensors: list[Sensor]) -> tuple[str, ...]:
+    """Photographs by each of the sensors, normals and mask where they are of one place, and what describes them.
+
+    Answers the names of the photographs, of brackets their first.
+    """
     import numpy as np
 
     import gonio as gn
@@ -190,3 +192,4 @@ def _write(output: Path, capture: Capture | Turntable, sensors: list[Sensor]) ->
         # Codes are radiance times exposure: so are the lights that go with them, and f comes out in 1/sr.
         lights = None if lights is None else tuple(scaled(light, sensors[0].exposure) for light in lights)
     gn.write_capture(output, dataclasses.replace(capture, photographs=written, lights=lights))
+    return tuple(written.names)

@@ -7,7 +7,8 @@
     vignetting = "vignetting.exr"         noise = {gain = 5e-5, read = 1e-3}
     mask = "mask.png"                     normals = "normals.png"
     shape = "flat"                        or a mesh, an image of heights in units of the world, whose samples are
-                                          `spacing` apart (else texel), or {centre = [x, y, z], radius = r}, a ball
+                                          `spacing` apart (else texel), {centre = [x, y, z], radius = r}, a ball, or
+                                          "sphere", the one whose silhouette the mask is: of `radius` under perspective
     cameras = "transforms.json"           photographs from many places, or COLMAP's; texels = [rows, columns] of uv
     [camera]                              texel = 0.1 (straight above), with size and pose from elsewhere; or fx fy cx
                                           cy size pose distortion; eye = [x, y, z]
@@ -72,7 +73,7 @@ class _Fields:
     def file(self, name: str) -> Path | None:
         """A file of the description's folder that a field names."""
         value = self.take(name, lambda v: isinstance(v, str), "the name of a file")
-        return None if value is None else self._place(name, value)
+        return None if value is None else self.place(name, value)
 
     def table(self, name: str) -> _Fields:
         value = self.take(name, lambda v: isinstance(v, dict), "a table") or {}
@@ -102,7 +103,8 @@ class _Fields:
         for left in self.fields:
             raise FileError(f"{self.path}: the field {self.prefix}{left} is not known.")
 
-    def _place(self, name: str, value: str) -> Path:
+    def place(self, name: str, value: str) -> Path:
+        """Where the file that a field names lies."""
         place = place_of(self.path.parent, value)
         if place is None:
             raise FileError(f"{self.path}: {self.prefix}{name} = {value!r} does not exist in its folder.")
@@ -124,7 +126,8 @@ def read_description(path: Path) -> Found:
     _radiometry(fields, found, groups)
     for name in _COMPANIONS:
         setattr(found, name, fields.file(name))
-    found.texels = fields.take("texels", _is_size, "[rows, columns]")
+    texels = fields.take("texels", _is_size, "[rows, columns]")
+    found.texels = None if texels is None else tuple(texels)
     found.spacing = fields.number("spacing")
     cameras = fields.file("cameras")
     of_one = [name for name in (*_COMPANIONS, "camera") if name in given]
@@ -216,8 +219,11 @@ def _radiometry(fields: _Fields, found: Found, groups: list[Any]) -> None:
 
 
 def _shape(fields: _Fields, found: Found) -> None:
-    shape = fields.take("shape", lambda v: isinstance(v, str | dict), "'flat', the name of a file or a ball")
-    found.flat = shape == "flat"
+    shape = fields.take("shape", lambda v: isinstance(v, str | dict), "'flat', 'sphere', the name of a file or a ball")
+    found.form = shape if shape in ("flat", "sphere") else None
+    found.radius = fields.number("radius")
+    if found.radius is not None and shape != "sphere":
+        raise FileError(f"{fields.path}: radius goes with shape = 'sphere'.")
     if isinstance(shape, dict):
         ball = _Fields(fields.path, shape, "shape.")
         centre, radius = ball.numbers("centre", 3), ball.number("radius")
@@ -225,8 +231,8 @@ def _shape(fields: _Fields, found: Found) -> None:
         if centre is None or radius is None:
             raise FileError(f"{fields.path}: a ball as shape has a centre and a radius.")
         found.shape = Sphere(centre, radius)
-    elif shape not in (None, "flat"):
-        found.shape = fields._place("shape", shape)
+    elif shape not in (None, found.form):
+        found.shape = fields.place("shape", shape)
 
 
 def _camera(camera: _Fields, found: Found) -> None:
@@ -397,7 +403,7 @@ def _table(name: str, rows: Any) -> list[str]:
 
 
 def _row(numbers: Any) -> str:
-    return f"[{', '.join(f'{x:.9g}' for x in numbers)}]"
+    return f"[{', '.join(f'{x:.12g}' for x in numbers)}]"
 
 
 def _is_names(value: Any) -> bool:

@@ -6,14 +6,17 @@ What is broken is refused; with partial=True the sound rest is taken, and `findi
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import warnings
 from pathlib import Path
 
 import numpy as np
 
+from ..cameras import Orthographic
 from ..capture.model import Capture, above
 from ..capture.photographs import Flattened, Photographs
+from ..capture.silhouette import sphere_of_silhouette
 from ..capture.turntable import Turntable
 from ..errors import EncodingWarning, FileError, GonioError
 from ..shapes.heightfield import HeightField
@@ -104,15 +107,24 @@ def _capture(found: Found, photographs: Photographs) -> Capture:
     if found.mask and known is not None and not np.all(known[mask]):
         found.notes.append(f"{found.normals}: {np.count_nonzero(mask & ~known)} pixels of the mask have no normal")
         mask = mask & known
-    if found.flat and normals is None:
+    camera = found.camera or above(size, found.texel)
+    shape = _shape(found)
+    if found.form == "flat" and normals is None:
         normals = np.broadcast_to((0.0, 0.0, 1.0), (*size, 3))
+    if found.form == "sphere":
+        if mask is None:
+            raise FileError(f"{found.folder}: a sphere is found by its silhouette: give a mask.")
+        shape = sphere_of_silhouette(mask, camera, found.radius).sphere
+        if isinstance(camera, Orthographic):
+            # Its distance is unknown, and does not matter: the world's plane goes through its middle.
+            shape = dataclasses.replace(shape, centre=shape.centre * (1, 1, 0))
     return Capture(
         photographs,
         found.lights,
         mask,
         normals,
-        _shape(found),
-        found.camera or above(size, found.texel),
+        shape,
+        camera,
         None if found.eye is None else np.array(found.eye),
         found.layout,
         (*found.defects, *found.notes),
@@ -121,8 +133,9 @@ def _capture(found: Found, photographs: Photographs) -> Capture:
 
 def _turntable(found: Found, photographs: Photographs) -> Turntable:
     shape = _shape(found)
-    if shape is not None and not isinstance(shape, Mesh):
-        raise FileError(f"{found.shape}: the shape of photographs from many places is a mesh.")
+    if found.form or (shape is not None and not isinstance(shape, Mesh)):
+        where = found.shape if isinstance(found.shape, Path) else found.folder
+        raise FileError(f"{where}: the shape of photographs from many places is a mesh.")
     assert found.cameras is not None
     return Turntable(
         photographs,

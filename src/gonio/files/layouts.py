@@ -58,7 +58,8 @@ class Found:
         self.normals: Path | None = None
         self.shape: Path | Shape | None = None
         self.spacing: float | None = None
-        self.flat = False
+        self.form: str | None = None  # "flat" or "sphere", of closed form
+        self.radius: float | None = None
         self.texels: tuple[int, int] | None = None
         self.notes: list[str] = []
         self.defects: list[str] = []
@@ -152,6 +153,8 @@ def _diligent(folder: Path) -> Found:
 
 def _turntable(folder: Path, path: Path) -> Found:
     found = Found(folder, "turntable")
+    nerf = path / "transforms.json"
+    where = path.name if path.is_file() else nerf.name if nerf.exists() else "COLMAP's model"
     cameras = read_cameras(path)
     found.cameras = tuple(cameras.values())
     # COLMAP names photographs within images/; NeRF's first scenes leave the suffix away.
@@ -159,7 +162,7 @@ def _turntable(folder: Path, path: Path) -> Found:
     places = [
         next((place for form in forms if (place := place_of(folder, form.format(name)))), None) for name in cameras
     ]
-    _take(found, list(cameras), places, path.name if path.is_file() else "the cameras")
+    _take(found, list(cameras), places, where)
     meshes = sorted(entry for entry in folder.iterdir() if entry.suffix.lower() in MESHES)
     if len(meshes) == 1:
         found.shape = meshes[0]
