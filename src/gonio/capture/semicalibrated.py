@@ -217,7 +217,8 @@ def _fit(values: np.ndarray, counted: np.ndarray, towards: np.ndarray, names: tu
         l, w, v = l[good], w[good], w[good] * values[some][good]
         v /= np.sqrt(np.sum(v * v, axis=1) / w.sum(axis=1))[:, None]
         across = np.swapaxes(axes[good], 1, 2) @ l * (v[:, None] / np.sqrt(turning[good])[..., None])
-        explained += np.tensordot(across, across, axes=((0, 1), (0, 1)))
+        flat = across.reshape(-1, n)
+        explained += flat.T @ flat
         sent += np.sum(v * v, axis=0)
         telling += w.sum(axis=0).astype(np.intp)
         parts.append((v, across))

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from ..capture.turntable import Turntable
     from ..lights.model import Light
 
+_BRIGHT = 0.95  # the code of what is brightest: of flat samples, nearly all
 _ELEVATION, _FIELD_OF_VIEW = 20.0, 40.0  # degrees, of the cameras that go round
 
 
@@ -37,7 +38,7 @@ def simulate(
     views: int = typer.Option(0, "--views", min=0, help="Photograph from so many places around, under a lamp each."),
     size: int = typer.Option(256, "--size", min=8, help="Pixels along the longer side."),
     shadows: bool = typer.Option(False, "--shadows", help="Trace shadow rays."),
-    exposure: float = typer.Option(0.0, "--exposure", help="Code for radiance 1; 0 takes what clips 1 pixel in 1000."),
+    exposure: float = typer.Option(0.0, "--exposure", help="Code for radiance 1; 0 leaves 1 pixel in 1000 above .95."),
     brackets: str = typer.Option("", "--brackets", help="Several exposures of each, in the above: 1,4,16."),
     gain: float = typer.Option(0.0, "--gain", help="Shot noise: variance for each unit of code."),
     read: float = typer.Option(0.0, "--read", help="Read noise: its standard deviation, of the brightest code."),
@@ -62,18 +63,19 @@ def simulate(
     if environment:
         arriving: list[Light] = [maps.read([environment], None, "")] * max(views, 1)
     else:
-        directions = gn.read_lp(lights).directions if lights else dome(views or count)
+        directions = gn.read_lp(lights).directions if lights else _beside(views) if views else dome(count)
         arriving = _lamps(directions, near, np.array(centre), solid)
     if views and len(arriving) < views:
         raise FileError(f"{lights} has {len(arriving)} lights for {views} views.")
     arriving = arriving[: views or None]
     ideal = _captured(solid, material, arriving, views, size, gn.Sensor(), shadows, 0.0, seed, centre, radius)
     if exposure <= 0:
-        exposure = 1 / _brightest(ideal)
+        exposure = _BRIGHT / _brightest(ideal)
     sensor = gn.Sensor(exposure, gain, read, bits)
+    sensors = [dataclasses.replace(sensor, exposure=exposure * m) for m in multiples]
     capture = _captured(solid, material, arriving, views, size, sensor, shadows, misaligned, seed, centre, radius)
     (output / "truth").mkdir(parents=True)
-    names = _write(output, capture, [dataclasses.replace(sensor, exposure=exposure * m) for m in multiples])
+    names = _write(output, capture, sensors)
     made = {"shape": shape, "brdf": brdf, "sensor": dataclasses.asdict(sensor), "shadows": shadows, "seed": seed}
     (output / "truth" / "made.json").write_text(json.dumps(made, indent=1), "utf-8")
     if ideal.directions is not None:
@@ -93,6 +95,19 @@ def dome(count: int) -> np.ndarray:
     k = np.arange(count) + 0.5
     z = 1 - k / count * (1 - np.cos(np.radians(75)))
     directions: np.ndarray = gn.from_spherical(np.arccos(z), k * np.pi * (3 - np.sqrt(5)))
+    return directions
+
+
+def _beside(views: int) -> np.ndarray:
+    """A direction for each of the cameras that go round: up to 70 degrees to its side, 15 to 60 above the horizon."""
+    import numpy as np
+
+    import gonio as gn
+
+    k = np.arange(views)
+    aside = np.radians(70) * np.sin(2.4 * k)
+    up = np.radians(15 + 45 * ((0.618 * k) % 1))
+    directions: np.ndarray = gn.from_spherical(np.pi / 2 - up, 2 * np.pi * k / views + aside)
     return directions
 
 
