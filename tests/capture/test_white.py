@@ -122,7 +122,7 @@ def test_a_falloff_that_was_told_is_corrected():
 def test_a_falloff_is_as_well_known_far_from_the_middle():
     # 3,000 texels away, squares are 9e6 +- 1e5: not centred, the seven digits of a photograph would be lost in them.
     middle = np.array([2015.0, 3015, 0])
-    camera = gn.Orthographic(pixel=1.0, size=(30, 30), pose=gn.look_at(middle + [0, 0, 100], middle, [0, 1.0, 0]))
+    camera = gn.Orthographic(pixel=1.0, size=(30, 30), pose=gn.look_at([2015.0, 3015, 100], middle, [0, 1.0, 0]))
     up = gn.distant_lights([[0.0, 0, 1]])
     scene = gn.Capture(Held(np.ones((1, 30, 30, 3))), up, camera=camera)
     at = scene.positions[scene.mask]

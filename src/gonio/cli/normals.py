@@ -44,8 +44,12 @@ def normals(
     if strengths:
         from gonio.capture.semicalibrated import estimate_strengths
 
-        found_strengths = estimate_strengths(scene)
-        scene = dataclasses.replace(scene, lights=found_strengths.lights)
+        told = estimate_strengths(scene)
+        typer.echo(f"{capture}: strengths of the lights: {told.reason}", err=True)
+        if told.converged:
+            scene = dataclasses.replace(scene, lights=told.lights)
+        else:
+            typer.echo(f"{capture}: strengths are left as they were told", err=True)
     output.mkdir(parents=True, exist_ok=True)
     names = ("normals.png", "relief.exr", "relief.png")
     for name in names:
