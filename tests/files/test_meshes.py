@@ -125,7 +125,7 @@ WRITTEN = {
         np.arange(270).reshape(-1, 3),
         normals=np.repeat(np.cross([[1.0, 2, 3]], SMALL.vertices[:90] + 2), 3, axis=0),
     ),
-    "far away": gn.Mesh(SMALL.vertices + [4e5, -5e6, 100], SMALL.faces, SMALL.uv, SMALL.normals),
+    "far away": gn.Mesh(SMALL.vertices + np.array([4e5, -5e6, 100]), SMALL.faces, SMALL.uv, SMALL.normals),
 }
 
 

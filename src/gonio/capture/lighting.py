@@ -71,6 +71,11 @@ def directions_of(lights: Sequence[Light] | None) -> np.ndarray | None:
     return np.concatenate([to_numpy(light.beams().directions) for light in lights]).astype(np.float64)
 
 
+def is_near(light: Light) -> bool:
+    """Whether it stands at a place, with a falloff that was measured or without."""
+    return isinstance(light.light if isinstance(light, Uneven) else light, Point)
+
+
 def arriving(light: Light, positions: np.ndarray) -> Arriving:
     """What `light` sends to `positions` (S, 3). Raises `ParameterError` where one lies in the light."""
     beams = light.beams(positions)

@@ -13,21 +13,24 @@ Not here: reading one (`files/captures.py`), photographs from several places (`t
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.ndimage import distance_transform_edt
 
 from ..arrays import Array, frozen, require_finite, to_numpy
+from ..brdf.model import BRDF
 from ..cameras import Camera, Orthographic
 from ..directions import normalise, require_unit
 from ..errors import ArrayError
 from ..frames import frame
 from ..lights.model import Light
+from ..reflection import varied
 from ..shapes.view import Shape, View
 from .lighting import directions_of, require_single
-from .photographs import Photographs
+from .photographs import Chosen, Photographs
 from .sites import Observation, Sites
 
 if TYPE_CHECKING:
@@ -126,6 +129,46 @@ class Capture:
         across = np.linalg.norm(np.cross(n, tangent), axis=1) > 1e-3
         frames[across] = frame(n[across], tangent[across])
         return Sites(positions, self._view.lifted[mask], frames)
+
+    @cached_property
+    def view(self) -> View:
+        """What the camera sees, as renderers have it: uv runs over the pixels, so that maps of the photographs' size
+        are its textures. Raises `ArrayError` where normals are unknown."""
+        sites, mask = self.sites, self.mask
+        rows, columns = mask.shape
+        row, column = np.nonzero(mask)
+        return View.of(
+            mask,
+            position=sites.positions,
+            lifted=sites.lifted,
+            geometric=sites.frames[:, 2],
+            normal=sites.frames[:, 2],
+            tangent=sites.frames[:, 0],
+            uv=np.stack(((column + 0.5) / columns, 1 - (row + 0.5) / rows), axis=-1),
+            wo=self._to_eye,
+            distance=np.linalg.norm(self.camera.towards(sites.positions), axis=-1),
+        )
+
+    def select(self, which: Sequence[int]) -> Capture:
+        """The same with the photographs numbered `which` alone. Raises `ArrayError` where there is no such one."""
+        n = len(self.photographs)
+        if not len(which) or not all(-n <= k < n for k in which):
+            raise ArrayError(f"photographs {list(which)} of {n}: give one or more of 0 to {n - 1}.")
+        lights = None if self.lights is None else tuple(self.lights[k] for k in which)
+        return dataclasses.replace(self, photographs=Chosen(self.photographs, which), lights=lights)
+
+    def textures(self, material: BRDF) -> BRDF:
+        """`material`, whose parameters vary over the sites, with those as textures over the pixels of `view`; beyond
+        the mask they are those of the nearest site."""
+        nearest = distance_transform_edt(~self.mask, return_distances=False, return_indices=True)
+
+        def spread(value: Array, axes: int) -> np.ndarray:
+            values = to_numpy(value)
+            over = np.zeros((*self.mask.shape, *values.shape[1:]), values.dtype)
+            over[self.mask] = values
+            return np.asarray(over[tuple(nearest)])
+
+        return varied(material, spread)
 
     def observe(self, k: int) -> Observation:
         """What photograph k tells of every site."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -78,6 +78,24 @@ class Held(Photographs):
     def read(self, k: int) -> Photograph:
         red, green, blue = np.moveaxis(self.radiance[k], -1, 0)
         return Photograph(self.radiance[k], (red >= self.white) | (green >= self.white) | (blue >= self.white))
+
+
+class Chosen(Photographs):
+    """Some of `photographs`, those numbered `which`, in that order."""
+
+    def __init__(self, photographs: Photographs, which: Sequence[int]) -> None:
+        self.photographs, self.which = photographs, [int(k) for k in which]
+        self.names, self.size = tuple(photographs.names[k] for k in self.which), photographs.size
+
+    def read(self, k: int) -> Photograph:
+        return self.photographs.read(self.which[k])
+
+    def pixels(self, at: np.ndarray, progress: Callable[[int, int], None] | None = None) -> Photograph:
+        radiance, clipped = self.photographs.pixels(at, progress)
+        return Photograph(radiance[self.which], clipped[self.which])
+
+    def parts(self, at: np.ndarray, most: int) -> Iterator[np.ndarray]:
+        return self.photographs.parts(at, most)
 
 
 class Flattened(Photographs):

@@ -164,6 +164,8 @@ def _captured(path: Path) -> Capture | Turntable:
 
 def _capture(path: Path) -> dict[str, Any]:
     import gonio as gn
+    from gonio.capture.lighting import is_near
+    from gonio.lights.uneven import Uneven
 
     capture = _captured(path)
     photographs = capture.photographs
@@ -179,9 +181,13 @@ def _capture(path: Path) -> dict[str, Any]:
         "lights": "unknown" if capture.lights is None else len(capture.lights),
         "encoding": "not stated" if getattr(files, "assumed", False) else "stated",
     }
-    near = sum(not light.distant for light in capture.lights or ())
+    told = capture.lights or ()
+    near = sum(is_near(light) for light in told)
     if near:
         facts["near lights"] = near
+    uneven = sum(isinstance(light, Uneven) for light in told)
+    if uneven:
+        facts["lights with a measured falloff"] = uneven
     if isinstance(capture, gn.Capture):
         facts["object"] = f"{capture.mask.mean():.1%} of the pixels"
         facts["normals"] = "given" if capture.normals is not None else "unknown"

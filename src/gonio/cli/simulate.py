@@ -77,6 +77,8 @@ def simulate(
     (output / "truth").mkdir(parents=True)
     names = _write(output, capture, sensors)
     made = {"shape": shape, "brdf": brdf, "sensor": dataclasses.asdict(sensor), "shadows": shadows, "seed": seed}
+    if near:
+        made["positions"] = [light.position.tolist() for light in ideal.lights or () if isinstance(light, gn.Point)]
     (output / "truth" / "made.json").write_text(json.dumps(made, indent=1), "utf-8")
     if ideal.directions is not None:
         gn.write_lp(output / "truth" / "dirs.lp", names, ideal.directions)

@@ -16,7 +16,7 @@
 
 Tables are lists of rows, one for each photograph. `directions` are unit; `positions` are near lights, in the unit of
 texel; `intensities` (R, G, B) are irradiances of the former, radiant intensities of the latter; `falloff` has the six
-coefficients of `Uneven`. Files lie in the description's folder or below.
+coefficients of `Uneven`; `axis` may be one for all. Files lie in the description's folder or below.
 """
 
 from __future__ import annotations
@@ -152,7 +152,7 @@ def read_description(path: Path) -> Found:
         name for group, at in zip(brackets, places, strict=True) for name, p in zip(group, at, strict=True) if not p
     ]
     if lost:
-        found.defects.append(f"{', '.join(lost[:5])} does not exist in its folder")
+        found.defects.append(f"{', '.join(lost[:5])}{' ...' if len(lost) > 5 else ''} does not exist in its folder")
     found.names = [tuple(place or "" for place in group) for group in places]
     found.keep(np.array([None not in group for group in places]))
     return found
@@ -162,8 +162,9 @@ def write_capture(folder: str | os.PathLike[str], capture: Capture | Turntable) 
     """Write capture.toml beside photographs that lie in `folder` already. Answers its path.
 
     Beside it come the files that it names: shape.obj or heights.exr, transforms.json of many cameras, response.toml and
-    vignetting.exr. mask.png and normals.png are named where they lie there. Raises `FileError` for photographs that do
-    not lie there, lights of several kinds, and shapes other than meshes, heights and spheres.
+    vignetting.exr. mask.png and normals.png are named where they lie there, and otherwise written where nothing else
+    tells them. Raises `FileError` for photographs that do not lie there, lights of several kinds, and shapes other than
+    meshes, heights and spheres.
     """
     folder = Path(folder)
     for name in capture.photographs.names:
@@ -177,9 +178,8 @@ def write_capture(folder: str | os.PathLike[str], capture: Capture | Turntable) 
         lines.append('cameras = "transforms.json"')
         lines += [f"texels = {list(capture.texels)}"] if capture.texels else []
     else:
-        for name in _COMPANIONS:
-            if (folder / f"{name}.png").exists():
-                lines.append(f'{name} = "{name}.png"')
+        _write_companions(folder, capture)
+        lines += [f'{name} = "{name}.png"' for name in _COMPANIONS if (folder / f"{name}.png").exists()]
     lines += _shape_lines(folder, capture)
     if isinstance(capture, Capture):
         lines += _camera_lines(capture)
@@ -263,7 +263,9 @@ def _lights(lights: _Fields, count: int) -> tuple[Light, ...] | None:
     directions, positions = lights.rows("directions", 3, count), lights.rows("positions", 3, count)
     intensities = lights.rows("intensities", 3, count)
     falloff = lights.take("falloff", _is_falloff, "a list of one or three rows of 6 numbers for each light")
-    axis = lights.numbers("axis", 3)
+    axis = lights.take("axis", _is_axis, "3 numbers, or a list of rows of 3 numbers")
+    if axis is not None and isinstance(axis[0], list) and len(axis) != count:
+        raise FileError(f"{lights.path}: lights.axis has {len(axis)} rows for {count} photographs.")
     exponent = lights.take("exponent", lambda v: v == 0 or _is_positive(v), "a number >= 0")
     lights.done()
     if directions is not None and positions is not None:
@@ -273,7 +275,12 @@ def _lights(lights: _Fields, count: int) -> tuple[Light, ...] | None:
     if directions is not None:
         found = distant_lights(directions, intensities)
     elif positions is not None:
-        found = near_lights(positions, intensities, axis, 1.0 if exponent is None else exponent)
+        found = near_lights(
+            positions,
+            intensities,
+            None if axis is None else np.array(axis, dtype=np.float64),
+            1.0 if exponent is None else exponent,
+        )
     elif intensities is not None or falloff is not None:
         raise FileError(f"{lights.path}: lights have neither directions nor positions.")
     else:
@@ -321,6 +328,18 @@ def _photograph_lines(folder: Path, photographs: Photographs) -> list[str]:
         write_image(folder / "vignetting.exr", np.broadcast_to(vignetting, (*vignetting.shape[:2], 3)))
         lines.append('vignetting = "vignetting.exr"')
     return lines
+
+
+def _write_companions(folder: Path, capture: Capture) -> None:
+    """The mask and the normals that nothing else in the description would tell, where no others lie there."""
+    mask, normals = capture.mask, capture.normals
+    if not (folder / "mask.png").exists() and not np.all(mask):
+        write_image(folder / "mask.png", mask.astype(np.float64), "linear")
+    if (folder / "normals.png").exists() or normals is None or capture.shape is not None:
+        return
+    if not np.all(normals[mask] == (0, 0, 1)):
+        codes = np.where(mask[..., None], 0.5 * normals + 0.5, 0.0)
+        write_image(folder / "normals.png", codes, "linear", bits=16, clip=True)
 
 
 def _shape_lines(folder: Path, capture: Capture | Turntable) -> list[str]:
@@ -377,12 +396,14 @@ def _light_lines(folder: Path, lights: tuple[Light, ...]) -> list[str]:
     elif len(near) == len(lights):
         lines += _table("positions", [light.position for light in near])
         strengths = [light.intensity for light in near]
-        axes = {None if light.axis is None else tuple(to_numpy(light.axis).tolist()) for light in near}
-        exponents = {light.exponent for light in near}
-        if len(axes) > 1 or len(exponents) > 1:
-            raise FileError(f"{folder}: lights with several axes or exponents are not written.")
-        if None not in axes:
-            lines += [f"axis = {_row(axes.pop())}", f"exponent = {exponents.pop():.9g}"]
+        axes = [to_numpy(light.axis) for light in near if light.axis is not None]
+        exponents = {light.exponent for light in near if light.axis is not None}
+        if len(axes) not in (0, len(near)) or len(exponents) > 1:
+            raise FileError(f"{folder}: lights of which some have no axis, or with several exponents, are not written.")
+        if axes:
+            one = all(np.array_equal(axis, axes[0]) for axis in axes)
+            lines += [f"axis = {_row(axes[0].tolist())}"] if one else _table("axis", axes)
+            lines.append(f"exponent = {exponents.pop():.12g}")
     else:
         raise FileError(f"{folder}: distant and near lights in one capture are not written.")
     colours = np.array([np.broadcast_to(to_numpy(strength), 3) for strength in strengths])
@@ -431,6 +452,10 @@ def _is_numbers(value: Any) -> bool:
 
 def _is_rows(value: Any, width: int) -> bool:
     return isinstance(value, list) and all(_is_numbers(row) and len(row) == width for row in value)
+
+
+def _is_axis(value: Any) -> bool:
+    return (_is_numbers(value) and len(value) == 3) or (_is_rows(value, 3) and bool(value))
 
 
 def _is_falloff(value: Any) -> bool:

@@ -64,7 +64,9 @@ def write_mesh(path: str | os.PathLike[str], mesh: Mesh) -> None:
     # Places to the last digit: surveyed ones lie far from the origin.
     digits = {"v": ".17g", "vn": ".9g", "vt": ".9g"}
     lines = [
-        f"{key} {' '.join(format(x, digits[key]) for x in row)}" for key, rows in tables.items() for row in rows.tolist()
+        f"{key} {' '.join(format(x, digits[key]) for x in row)}"
+        for key, rows in tables.items()
+        for row in rows.tolist()
     ]
     corner = "{0}//{0}" if mesh.uv is None else "{0}/{0}/{0}"
     lines += [f"f {' '.join(corner.format(k + 1) for k in face)}" for face in mesh.faces.tolist()]

@@ -62,25 +62,35 @@ class StoredPhotographs(Photographs):
         return Raster(self._held[1][k - group * _GROUP])
 
     def pixels(self, at: np.ndarray, progress: Callable[[int, int], None] | None = None) -> Photograph:
-        return photograph(self.path, self.rasters(at, progress), self.encoding)
+        radiance = np.empty((len(self.names), len(at), 3), np.float32)
+        clipped = np.empty((len(self.names), len(at)), bool)
+        for some, here, codes in self._chunks(np.asarray(at), progress):
+            radiance[some, here], clipped[some, here] = photograph(self.path, Raster(codes), self.encoding)
+        return Photograph(radiance, clipped)
 
     def rasters(self, at: np.ndarray, progress: Callable[[int, int], None] | None = None) -> Raster:
         """The samples of all photographs at pixels `at` (P,), (N, P, 3), as their files had them."""
-        at = np.asarray(at)
+        samples = np.empty((len(self.names), len(at), 3), self.codes.dtype)
+        for some, here, codes in self._chunks(np.asarray(at), progress):
+            samples[some, here] = codes
+        return Raster(samples)
+
+    def _chunks(
+        self, at: np.ndarray, progress: Callable[[int, int], None] | None
+    ) -> Iterator[tuple[slice, np.ndarray, np.ndarray]]:
+        """A chunk after the other: which photographs and which of `at` it has, and their codes."""
+        count, tiles = len(self.names), self._tiles(at)
         rows, columns = np.divmod(at, self.size[1])
-        samples = np.empty((len(self.names), len(rows), 3), self.codes.dtype)
-        tiles = self._tiles(at)
         wanted = np.unique(tiles)
         for done, tile in enumerate(wanted):
             here = np.flatnonzero(tiles == tile)
             top, left = rows[here[0]] // _TILE * _TILE, columns[here[0]] // _TILE * _TILE
             place = slice(top, top + _TILE), slice(left, left + _TILE)
-            for low in range(0, len(self.names), _GROUP):
+            for low in range(0, count, _GROUP):
                 some = slice(low, low + _GROUP)
-                samples[some, here] = self._read((some, *place))[:, rows[here] - top, columns[here] - left]
-            if progress is not None:
-                progress(done + 1, len(wanted))
-        return Raster(samples)
+                yield some, here, self._read((some, *place))[:, rows[here] - top, columns[here] - left]
+                if progress is not None:
+                    progress(done * count + min(low + _GROUP, count), len(wanted) * count)
 
     def parts(self, at: np.ndarray, most: int) -> Iterator[np.ndarray]:
         at = np.asarray(at)

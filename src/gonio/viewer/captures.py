@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from ..capture.circles import Circle
-from ..capture.lighting import arriving
+from ..capture.lighting import arriving, is_near
 from ..capture.model import Capture
 from ..capture.photometric_stereo import Relief
 from ..capture.turntable import Turntable
 from ..directions import normalise
-from ..files.whole import writing
 from ..rendering.tonemap import clipped, tone_map
+from .figures import blank, exposed, save
 from .plots import INK
 
 _MOST = 30  # photographs on a sheet, evenly chosen
@@ -31,7 +31,7 @@ def contact_sheet(path: str | Path, capture: Capture | Turntable) -> Path:
     across = math.ceil(math.sqrt(1.5 * len(thumbs)))
     down = math.ceil(len(thumbs) / across)
     title, towards = _towards(capture)
-    figure = _figure(1.15 * across + (4.4 if towards is not None else 0.4), max(1.3 * down, 4.4))
+    figure = blank(1.15 * across + (4.4 if towards is not None else 0.4), max(1.3 * down, 4.4))
     parts = figure.add_gridspec(1, 2, width_ratios=(1.15 * across, 4.2)) if towards is not None else None
     grid = (parts[0] if parts else figure.add_gridspec(1, 1)[0]).subgridspec(down, across, hspace=0.25, wspace=0.05)
     for place, k, thumb in zip(grid, chosen, thumbs, strict=False):
@@ -41,16 +41,16 @@ def contact_sheet(path: str | Path, capture: Capture | Turntable) -> Path:
         axes.set_axis_off()
     if parts is not None:
         _directions(figure.add_subplot(parts[1]), towards, chosen, title)
-    return _save(figure, Path(path))
+    return save(figure, path)
 
 
 def ball_picture(
     path: str | Path, image: np.ndarray, circle: Circle, highlights: np.ndarray, directions: np.ndarray
 ) -> Path:
     """Write a PNG of a mirror ball (rows, columns, 3), its outline and highlights (N, 2), beside the lights (N, 3)."""
-    figure = _figure(9.4, 4.6)
+    figure = blank(9.4, 4.6)
     left, right = figure.subplots(1, 2)
-    left.imshow(tone_map(_exposed(image), clipped), extent=(0, image.shape[1], image.shape[0], 0))
+    left.imshow(tone_map(exposed(image), clipped), extent=(0, image.shape[1], image.shape[0], 0))
     turn, (row, column) = np.linspace(0, 2 * math.pi, 181), circle.centre
     left.plot(column + circle.radius * np.cos(turn), row + circle.radius * np.sin(turn), color="#d08a1c", linewidth=1.2)
     left.scatter(highlights[:, 1], highlights[:, 0], s=22, facecolors="none", edgecolors="#e0218a", linewidths=1.0)
@@ -59,7 +59,7 @@ def ball_picture(
     left.set_title("outline and highlights", color=INK, fontsize=8)
     left.set_axis_off()
     _directions(right, directions, np.arange(len(directions)), "lights")
-    return _save(figure, Path(path))
+    return save(figure, path)
 
 
 def relief_picture(path: str | Path, relief: Relief, heights: np.ndarray | None = None) -> Path:
@@ -67,7 +67,7 @@ def relief_picture(path: str | Path, relief: Relief, heights: np.ndarray | None 
     rows, columns = relief.used.shape
     panels: list[tuple[str, np.ndarray, dict[str, Any]]] = [
         ("normals", np.where(np.isfinite(relief.normals), 0.5 * relief.normals + 0.5, 1).clip(0, 1), {}),
-        ("albedo, relative", tone_map(_exposed(np.nan_to_num(relief.albedo)), clipped), {}),
+        ("albedo, relative", tone_map(exposed(np.nan_to_num(relief.albedo)), clipped), {}),
         ("residual, % of albedo", 100 * relief.residual, {"cmap": "magma"}),
         ("standard error of the normal, degrees", np.degrees(relief.error), {"cmap": "magma"}),
         ("photographs that count", np.where(relief.used > 0, relief.used, np.nan), {"cmap": "viridis"}),
@@ -76,7 +76,7 @@ def relief_picture(path: str | Path, relief: Relief, heights: np.ndarray | None 
         panels.append(("heights, pixels", heights, {"cmap": "viridis"}))
     across = 3
     side = 4.0
-    figure = _figure(across * side, math.ceil(len(panels) / across) * (side * rows / columns + 0.5))
+    figure = blank(across * side, math.ceil(len(panels) / across) * (side * rows / columns + 0.5))
     for k, (title, image, style) in enumerate(panels):
         axes = figure.add_subplot(math.ceil(len(panels) / across), across, k + 1)
         if image.ndim == 2:
@@ -89,7 +89,7 @@ def relief_picture(path: str | Path, relief: Relief, heights: np.ndarray | None 
             axes.imshow(image)
         axes.set_title(title, color=INK, fontsize=9)
         axes.set_axis_off()
-    return _save(figure, Path(path))
+    return save(figure, path)
 
 
 def _towards(capture: Capture | Turntable) -> tuple[str, np.ndarray | None]:
@@ -99,7 +99,7 @@ def _towards(capture: Capture | Turntable) -> tuple[str, np.ndarray | None]:
         return "cameras", normalise(np.stack([camera.towards(middle) for camera in capture.cameras]))
     if capture.lights is None:
         return "", None
-    near = "near lights" if capture.directions is None else "lights"
+    near = "near lights" if any(map(is_near, capture.lights)) else "lights"
     middle = np.nanmean(capture.positions[capture.mask], axis=0)[None]
     return near, np.concatenate([arriving(light, middle).direction for light in capture.lights])
 
@@ -127,23 +127,3 @@ def _thumb(image: np.ndarray) -> np.ndarray:
     blocks = image[:rows, :columns].reshape(rows // step, step, columns // step, step, 3)
     thumb: np.ndarray = blocks.mean(axis=(1, 3))
     return thumb
-
-
-def _exposed(image: np.ndarray) -> np.ndarray:
-    bright = float(np.quantile(image.max(axis=2), 0.98))
-    return image * (0.8 / bright) if bright > 0 else image
-
-
-def _figure(width: float, height: float) -> Any:
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(width, height), dpi=110, layout="constrained")
-    FigureCanvasAgg(figure)
-    return figure
-
-
-def _save(figure: Any, path: Path) -> Path:
-    with writing(path) as temporary:
-        figure.savefig(temporary, transparent=True)
-    return path

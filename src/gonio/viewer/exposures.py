@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from ..capture.exposure import Merged, Response
-from ..files.whole import writing
 from ..rendering.tonemap import tone_map
+from .figures import blank, save
 from .plots import INK
 
 _CHANNELS = {1: (INK,), 3: ("#d04a3c", "#3a9a4c", "#4a74d0")}
@@ -19,14 +19,10 @@ _SIDE = 1200  # pixels of an image that is drawn
 
 def merged_picture(path: str | Path, merged: Merged, response: Response) -> Path:
     """Write a PNG of the response, the radiance (saturated pixels magenta), and its relative standard deviation."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     step = max(1, -(-max(merged.saturated.shape) // _SIDE))
     radiance, variance, saturated = (x[::step, ::step] for x in (merged.radiance, merged.variance, merged.saturated))
     rows, columns = saturated.shape
-    figure = Figure(figsize=(13.2, max(3.2, 4.4 * rows / columns + 0.5)), dpi=110, layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = blank(13.2, max(3.2, 4.4 * rows / columns + 0.5))
     left, middle, right = figure.subplots(1, 3, width_ratios=(0.8, 1, 1.1))
     _response(left, response)
     shown = np.array(tone_map(radiance.clip(0), exposure=None))
@@ -44,9 +40,7 @@ def merged_picture(path: str | Path, merged: Merged, response: Response) -> Path
     right.set_title("standard deviation, % of the radiance", color=INK, fontsize=9)
     for axes in (middle, right):
         axes.set_axis_off()
-    with writing(Path(path)) as temporary:
-        figure.savefig(temporary, transparent=True)
-    return Path(path)
+    return save(figure, path)
 
 
 def _response(axes: Any, response: Response) -> None:

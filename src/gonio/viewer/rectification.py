@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from ..capture.rectification import Rectified
-from ..files.whole import writing
 from ..rendering.tonemap import clipped, tone_map
+from .figures import blank, save
 from .plots import INK
 
 _LINES = 9  # across the grid and down, its outline among them
@@ -25,16 +25,12 @@ def rectified_picture(
 
     corners (N, 2): a board's, in the photograph. Both pictures are exposed alike.
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     (rows, columns), (height, width) = texels.size, photograph.shape[:2]
     bright = float(np.quantile(rectified.max(axis=2), 0.98))
     exposure = 0.8 / bright if bright > 0 else 1.0
     side = 4.6
     widths = (side * width / height, side * columns / rows)
-    figure = Figure(figsize=(sum(widths), side + 0.4), dpi=110, layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = blank(sum(widths), side + 0.4)
     left, right = figure.subplots(1, 2, width_ratios=widths)
     left.imshow(tone_map(exposure * photograph, clipped), extent=(0, width, height, 0))
     # Lines that are straight in the plane are bent where the lens distorts.
@@ -56,6 +52,4 @@ def rectified_picture(
     right.set_title(f"{columns} x {rows} texels of {texels.grid.texel:.4g}", color=INK, fontsize=8)
     for axes in (left, right):
         axes.set_axis_off()
-    with writing(Path(path)) as temporary:
-        figure.savefig(temporary, transparent=True)
-    return Path(path)
+    return save(figure, path)
