@@ -16,7 +16,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..arrays import to_numpy
+from ..arrays import frozen, to_numpy
 from ..brdf.model import BRDF
 from ..cameras import Camera, Orthographic, look_at
 from ..directions import normalise
@@ -70,6 +70,7 @@ class SimulatedPhotographs(Photographs):
         self.names = tuple(f"photo{k:0{len(str(len(lights) - 1))}}.png" for k in range(len(lights)))
         self.size = self.cameras[0].size
         self._seen: tuple[Camera, View, BRDF] | None = None
+        self._truth: tuple[int, np.ndarray] | None = None
 
     def view(self, k: int) -> View:
         """What camera k sees of the shape."""
@@ -77,6 +78,11 @@ class SimulatedPhotographs(Photographs):
 
     def truth(self, k: int) -> np.ndarray:
         """Radiance without sensor, (rows, columns, 3): black where nothing is."""
+        if self._truth is None or self._truth[0] != k:
+            self._truth = k, frozen(self._radiance(k))
+        return self._truth[1]
+
+    def _radiance(self, k: int) -> np.ndarray:
         view, material = self._scene(k)
         mask = view.mask
         image = np.zeros((*mask.shape, 3))
@@ -91,7 +97,7 @@ class SimulatedPhotographs(Photographs):
                     self.lights[k],
                     view.frames[mask],
                     view.wo[mask],
-                    view.lifted[mask],
+                    view.lifted[mask] if self.shadows else view.position[mask],
                     visibility=arriving if self.shadows else None,
                 )
             )

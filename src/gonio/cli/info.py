@@ -47,7 +47,7 @@ def describe(path: Path) -> dict[str, Any]:
     from gonio.errors import FileError
 
     suffix = path.suffix.lower()
-    if path.is_dir() or suffix in CAPTURES:
+    if path.is_dir() or suffix in CAPTURES or path.name.startswith("transforms"):
         return _capture(path)
     if suffix in IMAGES + RAW:
         return _image(path)

@@ -28,19 +28,24 @@ def contact_sheet(path: str | Path, capture: Capture | Turntable) -> Path:
     chosen = np.unique(np.linspace(0, len(capture.photographs) - 1, _MOST).astype(int))
     thumbs = [_thumb(capture.photographs.read(int(k)).radiance) for k in chosen]
     bright = float(np.quantile(np.stack([thumb.max(axis=2) for thumb in thumbs]), 0.98))
+    title, towards = _towards(capture)
     across = math.ceil(math.sqrt(1.5 * len(thumbs)))
     down = math.ceil(len(thumbs) / across)
-    title, towards = _towards(capture)
-    figure = blank(1.15 * across + (4.4 if towards is not None else 0.4), max(1.3 * down, 4.4))
-    parts = figure.add_gridspec(1, 2, width_ratios=(1.15 * across, 4.2)) if towards is not None else None
-    grid = (parts[0] if parts else figure.add_gridspec(1, 1)[0]).subgridspec(down, across, hspace=0.25, wspace=0.05)
+    # A row is as high as its photographs with their numbers; what the plot beside needs more is left free below.
+    high = down * (1.15 * thumbs[0].shape[0] / thumbs[0].shape[1] + 0.2)
+    rest = max(4.4 - high, 0.01) if towards is not None else 0.01
+    figure = blank(1.15 * across + (4.4 if towards is not None else 0.4), high + rest)
+    parts = figure.add_gridspec(
+        2, 2, width_ratios=(1.15 * across, 4.2 if towards is not None else 0.2), height_ratios=(high, rest)
+    )
+    grid = parts[0, 0].subgridspec(down, across, hspace=0.25, wspace=0.05)
     for place, k, thumb in zip(grid, chosen, thumbs, strict=False):
         axes = figure.add_subplot(place)
         axes.imshow(tone_map(thumb * (0.8 / bright) if bright > 0 else thumb, clipped))
         axes.set_title(f"{k}", color=INK, fontsize=7, pad=2)
         axes.set_axis_off()
-    if parts is not None:
-        _directions(figure.add_subplot(parts[1]), towards, chosen, title)
+    if towards is not None:
+        _directions(figure.add_subplot(parts[:, 1]), towards, chosen, title)
     return save(figure, path)
 
 
