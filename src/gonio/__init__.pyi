@@ -15,6 +15,7 @@ from .brdf.ndf_table import TabulatedNDF as TabulatedNDF
 from .brdf.phong import BlinnPhong as BlinnPhong
 from .brdf.phong import ModifiedPhong as ModifiedPhong
 from .brdf.phong import Phong as Phong
+from .brdf.radial import Radial as Radial
 from .brdf.shadowing import Ashikhmin as Ashikhmin
 from .brdf.shadowing import Smith as Smith
 from .brdf.shadowing import VGroove as VGroove
@@ -73,10 +74,15 @@ from .files.merl import write_merl as write_merl
 from .files.merl_fits import read_merl_fits as read_merl_fits
 from .files.meshes import read_mesh as read_mesh
 from .files.meshes import write_mesh as write_mesh
+from .files.relightable import read_relightable as read_relightable
+from .files.relightable import write_relightable as write_relightable
 from .files.rgl import read_rgl as read_rgl
 from .files.shrm import read_shrm as read_shrm
 from .files.shrm import write_shrm as write_shrm
 from .files.transforms import write_transforms as write_transforms
+from .fitting.model import Fit as Fit
+from .fitting.sharing import Scales as Scales
+from .fitting.sharing import share_reflectance as share_reflectance
 from .frames import euler as euler
 from .frames import euler_angles as euler_angles
 from .frames import frame as frame
@@ -113,6 +119,8 @@ from .rendering.irradiance import irradiance_map as irradiance_map
 from .rendering.irradiance import irradiance_matrix as irradiance_matrix
 from .rendering.prefiltered import render_prefiltered as render_prefiltered
 from .rendering.reflection_map import reflection_map as reflection_map
+from .rendering.relight import Relightable as Relightable
+from .rendering.relight import relight as relight
 from .rendering.shrm import SHRM as SHRM
 from .rendering.shrm import prefilter as prefilter
 from .rendering.split_sum import split_sum as split_sum

@@ -13,7 +13,22 @@ from typing import Any
 import typer
 
 from ..errors import GonioError
-from . import calibrate, convert, demo, flat, info, ingest, merge, normals, prefilter, rectify, render, sh, simulate
+from . import (
+    calibrate,
+    convert,
+    demo,
+    flat,
+    info,
+    ingest,
+    merge,
+    normals,
+    prefilter,
+    rectify,
+    render,
+    sh,
+    share,
+    simulate,
+)
 
 Usage: Any = typer.BadParameter.__base__  # click's error for whatever is mistyped, which typer does not name
 
@@ -50,6 +65,7 @@ for verb in (
     calibrate.calibrate,
     rectify.rectify,
     normals.normals,
+    share.share,
     simulate.simulate,
     render.render,
     prefilter.prefilter,

@@ -26,6 +26,7 @@ class Curve(enum.StrEnum):
 
 
 def render(
+    thing: Path | None = typer.Argument(None, help="A .gonio of gonio share: seen as it was photographed, relit."),
     output: Path = typer.Option(..., "--output", "-o", help="image.exr (linear), or image.png (tone-mapped)."),
     brdf: list[str] = typer.Option(
         ["lambert:albedo=.6"],
@@ -57,6 +58,13 @@ def render(
     from gonio.files.images import require_writable
 
     require_writable(output)
+    if thing:
+        room = _light(light, layout, orientation, sun)
+        with bar("render") as progress:
+            image = gn.relight(gn.read_relightable(thing), room, samples, progress)
+        write(output, image, exposure, curve)
+        typer.echo(str(output))
+        return
     columns, rows = parse.size(size)
     material = parse.reflectance(brdf)
     arriving = None if maps_file and not light and not sun and not compare else _light(light, layout, orientation, sun)

@@ -1,0 +1,117 @@
+"""What reflectance sharing found of one view, in .gonio files (`archive.py`): kind "relightable".
+
+gonio.json      made; terms: [{logarithm, folded, flat}, ...], the Radial models that add up
+term-K-NAME.npy centres (N, d), scales (d,), coefficients (N, C), polynomial (d + 1, C), limits (2, C), of term K;
+                x, y (rows, columns) where it is spatial; factor (rows, columns, C) or (C,) where it is scaled
+NAME.npy        mask (rows, columns) bool; position, lifted, normal, tangent, wo (sites, 3) of the mask, along its rows
+vertices, faces, uv.npy    of the shape, where it is known
+"""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+import numpy as np
+
+from ..arrays import to_numpy
+from ..brdf.combine import Scaled, Sum
+from ..brdf.model import BRDF
+from ..brdf.radial import Interpolant, Radial
+from ..errors import FileError, GonioError
+from ..rendering.relight import Relightable
+from ..shapes.mesh import Mesh
+from ..shapes.view import View
+from .archive import read_archive, write_archive
+
+_KIND, _VERSION = "relightable", 1
+_VIEW = ("position", "lifted", "normal", "tangent", "wo")
+_FLAGS = ("logarithm", "folded", "flat")
+_INTERPOLANT = ("centres", "scales", "coefficients", "polynomial")
+
+
+def write_relightable(path: str | os.PathLike[str], thing: Relightable, made: str = "") -> None:
+    """Write `thing`, with words on how it was made, whole or not at all.
+
+    Raises `FileError` where its material is another than Radial models, scaled or not, and their sums.
+    """
+    terms, arrays = [], {}
+    for k, term in enumerate(thing.material.terms if isinstance(thing.material, Sum) else (thing.material,)):
+        if isinstance(term, Scaled):
+            arrays[f"term-{k}-factor"] = to_numpy(term.factor)
+            term = term.model
+        if not isinstance(term, Radial):
+            raise FileError(f"{path}: a {type(term).__name__} is not written; Radial models are.")
+        terms.append({name: getattr(term, name) for name in _FLAGS})
+        arrays |= {f"term-{k}-{name}": to_numpy(getattr(term.interpolant, name)) for name in _INTERPOLANT}
+        if term.interpolant.limits is not None:
+            arrays[f"term-{k}-limits"] = to_numpy(term.interpolant.limits)
+        arrays |= {
+            f"term-{k}-{name}": to_numpy(getattr(term, name)) for name in "xy" if getattr(term, name) is not None
+        }
+    view = thing.view
+    arrays["mask"] = view.mask
+    arrays |= {name: getattr(view, name)[view.mask].astype(np.float32) for name in _VIEW}
+    if thing.shape is not None:
+        arrays |= {name: to_numpy(getattr(thing.shape, name)) for name in ("vertices", "faces", "uv")}
+    write_archive(path, _KIND, _VERSION, {"made": made, "terms": terms}, arrays)
+
+
+def read_relightable(path: str | os.PathLike[str]) -> Relightable:
+    """What `write_relightable` wrote. Raises `FileError` naming the file and the field at fault."""
+    fields, arrays = read_archive(path, _KIND, _VERSION)
+    terms = fields.get("terms")
+    if not isinstance(terms, list) or not terms:
+        raise FileError(f"{path}: the field 'terms' is no list of one or more.")
+    try:
+        models = tuple(_term(path, k, term, arrays) for k, term in enumerate(terms))
+        material = models[0] if len(models) == 1 else Sum(models)
+        shape = None
+        if "vertices" in arrays:
+            shape = Mesh(*(_array(path, arrays, name) for name in ("vertices", "faces", "uv")))
+        return Relightable(_view(path, arrays), material, shape)
+    except FileError:
+        raise
+    except GonioError as error:
+        raise FileError(f"{path}: {error}") from error
+
+
+def _term(path: str | os.PathLike[str], k: int, term: Any, arrays: dict[str, np.ndarray]) -> BRDF:
+    if not isinstance(term, dict) or not all(isinstance(term.get(name), bool) for name in _FLAGS):
+        raise FileError(f"{path}: terms[{k}] is {term!r:.80}; it has {', '.join(_FLAGS)}, each true or false.")
+    own = {name: _array(path, arrays, f"term-{k}-{name}") for name in _INTERPOLANT}
+    interpolant = Interpolant(**own, limits=arrays.get(f"term-{k}-limits"))
+    model: BRDF = Radial(
+        interpolant,
+        x=arrays.get(f"term-{k}-x"),
+        y=arrays.get(f"term-{k}-y"),
+        **{name: term[name] for name in _FLAGS},
+    )
+    factor = arrays.get(f"term-{k}-factor")
+    return model if factor is None else Scaled(model, factor)
+
+
+def _view(path: str | os.PathLike[str], arrays: dict[str, np.ndarray]) -> View:
+    mask = _array(path, arrays, "mask")
+    if mask.ndim != 2 or mask.dtype != np.bool_:
+        raise FileError(f"{path}: mask.npy is {mask.dtype} {mask.shape}; pixels of bool are wanted.")
+    count = int(np.count_nonzero(mask))
+    of = {name: _array(path, arrays, name).astype(np.float64) for name in _VIEW}
+    for name, array in of.items():
+        if array.shape != (count, 3) or not np.isfinite(array).all():
+            raise FileError(f"{path}: {name}.npy has shape {array.shape}, or is not finite; {(count, 3)} is wanted.")
+        if name in ("normal", "tangent", "wo"):
+            length = np.linalg.norm(array, axis=1, keepdims=True)
+            if not np.all(np.abs(length - 1) < 1e-3):
+                raise FileError(f"{path}: {name}.npy holds vectors that are not unit.")
+            of[name] = array / length
+    row, column = np.nonzero(mask)
+    rows, columns = mask.shape
+    uv = np.stack(((column + 0.5) / columns, 1 - (row + 0.5) / rows), axis=-1)
+    return View.of(mask, geometric=of["normal"], uv=uv, distance=np.zeros(count), **of)
+
+
+def _array(path: str | os.PathLike[str], arrays: dict[str, np.ndarray], name: str) -> np.ndarray:
+    if name not in arrays:
+        raise FileError(f"{path}: {name}.npy is missing.")
+    return arrays[name]

@@ -1,0 +1,65 @@
+"""What a camera saw once, under any other light: sites, normals and reflectance are known, and nothing is traced.
+
+    B(x) = sum_k f(x, wi_k, wo) E_k max(n.wi_k, 0)          at the pixels of a view
+
+Not here: shadows that the shape casts, and other places of the eye (`render`, with a shape).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+
+import numpy as np
+
+from ..arrays import to_numpy
+from ..brdf.model import BRDF
+from ..errors import ArrayError
+from ..lights.model import Light
+from ..reflection import radiance, textured
+from ..shapes.mesh import Mesh
+from ..shapes.view import View
+from .image import FEWEST, MOST, beams_wanted
+
+_SITES = 1 << 14  # between two words of progress
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Relightable:
+    """`view`, what a camera sees at its pixels; `material` over its uv; `shape`, a mesh with the same uv, if known."""
+
+    view: View
+    material: BRDF
+    shape: Mesh | None = None
+
+    def __post_init__(self) -> None:
+        if self.view.mask.ndim != 2 or not self.view.mask.any():
+            raise ArrayError(f"view has a mask of shape {self.view.mask.shape}; pixels (rows, columns), some seen.")
+
+
+def relight(
+    thing: Relightable,
+    light: Light,
+    samples: int | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> np.ndarray:
+    """The radiance (rows, columns, 3), float32, of every pixel that sees something, 0 elsewhere.
+
+    samples: the most beams of the light, what the material's lobes want where None. progress(done, total): pixels.
+    """
+    view = thing.view
+    mask = view.mask
+    if samples is None:
+        samples = min(max(beams_wanted(thing.material), FEWEST), MOST)
+    at = np.flatnonzero(mask)
+    image = np.zeros((mask.size, 3), np.float32)
+    frames, wo = view.frames.reshape(-1, 3, 3), view.wo.reshape(-1, 3)
+    lifted = view.lifted.reshape(-1, 3)
+    uv = None if view.uv is None else view.uv.reshape(-1, 2)
+    for low in range(0, at.size, _SITES):
+        some = at[low : low + _SITES]
+        material = textured(thing.material, None if uv is None else uv[some])
+        image[some] = to_numpy(radiance(material, light, frames[some], wo[some], lifted[some], budget=samples))
+        if progress is not None:
+            progress(low + some.size, at.size)
+    return image.reshape(*mask.shape, 3)
