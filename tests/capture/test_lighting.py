@@ -124,9 +124,7 @@ def test_lights_that_are_none_are_refused():
     ):
         with pytest.raises(gn.GonioError, match=message):
             make()
-    capture = gn.Capture(
-        Held(np.ones((1, 2, 2, 3))), gn.near_lights([[0.5, 0.5, 0.0]]), normals=np.zeros((2, 2, 3)) + [0, 0, 1]
-    )
+    capture = gn.Capture(Held(np.ones((1, 2, 2, 3))), gn.near_lights([[0.5, 0.5, 0.0]]), normals=UP)
     with pytest.raises(gn.GonioError, match="lies in the light"):
         next(iter(capture.reflectance()))
 
