@@ -159,11 +159,14 @@ class Capture:
 
     def textures(self, material: BRDF) -> BRDF:
         """`material`, whose parameters vary over the sites, with those as textures over the pixels of `view`; beyond
-        the mask they are those of the nearest site."""
+        the mask they are those of the nearest site. Raises `ArrayError` where they vary over other sites."""
+        count = int(np.count_nonzero(self.mask))
         nearest = distance_transform_edt(~self.mask, return_distances=False, return_indices=True)
 
         def spread(value: Array, axes: int) -> np.ndarray:
             values = to_numpy(value)
+            if len(values) != count:
+                raise ArrayError(f"a parameter has shape {values.shape}; {count} sites are on the mask.")
             over = np.zeros((*self.mask.shape, *values.shape[1:]), values.dtype)
             over[self.mask] = values
             return np.asarray(over[tuple(nearest)])

@@ -55,13 +55,18 @@ def render(
 ) -> None:
     """Render a shape with a BRDF under environment maps and directional lights."""
     import gonio as gn
+    from gonio.errors import ParameterError
     from gonio.files.images import require_writable
 
     require_writable(output)
     if thing:
-        room = _light(light, layout, orientation, sun)
+        if shape != "sphere" or maps_file or compare or shadows:
+            raise ParameterError(
+                f"{thing} is relit as it was photographed: --shape, --maps, --compare and --shadows go without."
+            )
+        seen, room = gn.read_relightable(thing), _light(light, layout, orientation, sun)
         with bar("render") as progress:
-            image = gn.relight(gn.read_relightable(thing), room, samples, progress)
+            image = gn.relight(seen, room, samples, progress)
         write(output, image, exposure, curve)
         typer.echo(str(output))
         return

@@ -24,7 +24,9 @@ def share(
     capture: Path = captures.FOLDER,
     output: Path = typer.Option(..., "--output", "-o", help="thing.gonio, which gonio render relights."),
     centres: int = typer.Option(2000, "--centres", min=8, help="Of the radial functions, at most."),
-    error: float = typer.Option(0.0, "--error", min=0, help="Stop when the rms residual has come down to this."),
+    error: float = typer.Option(
+        0.0, "--error", min=0, help="Stop when log f is fitted to this, rms; exit 1 if it never is."
+    ),
     leave: str = typer.Option("", "--leave", help="Photographs to leave out and predict: 0,5,9."),
     homogeneous: bool = typer.Option(False, "--homogeneous", help="One BRDF everywhere."),
     texture: bool = typer.Option(False, "--texture", help="A colour for each pixel, times what is shared."),
@@ -53,8 +55,9 @@ def share(
             raise FileError(f"{path}: end its name in {suffix}.")
         if path:
             writable(path)
+    given = _scales(scales)
     scene = captures.read(capture, encoding, partial, lights)
-    left = [int(k) for k in parse.numbers(leave)] if leave else []
+    left = _left_out(leave, len(scene.photographs))
     kept = [k for k in range(len(scene.photographs)) if k not in left]
     if scene.normals is None:
         typer.echo(f"{capture}: its shape is unknown; normals by photometric stereo", err=True)
@@ -67,7 +70,7 @@ def share(
             places,
             centres=centres,
             error=error,
-            scales=_scales(scales),
+            scales=given,
             texture=texture,
             logarithm=not paper,
             folded=not paper,
@@ -97,11 +100,27 @@ def share(
         sharing_picture(picture, names, shown, fit.history)
     if as_json:
         typer.echo(json.dumps(facts))
-        return
-    for name, value in facts.items():
-        worded = " ".join(f"{x:.3g}" for x in value) if isinstance(value, list) else value
-        typer.echo(f"{name:>28}  {worded:.4g}" if isinstance(worded, float) else f"{name:>28}  {worded}")
-    typer.echo(str(output))
+    else:
+        for name, value in facts.items():
+            worded = " ".join(f"{x:.3g}" for x in value) if isinstance(value, list) else value
+            typer.echo(f"{name:>28}  {worded:.4g}" if isinstance(worded, float) else f"{name:>28}  {worded}")
+        typer.echo(str(output))
+    if error and not fit.converged:
+        raise typer.Exit(1)
+
+
+def _left_out(text: str, count: int) -> list[int]:
+    """The numbers of photographs that `--leave` names, each once."""
+    from gonio.errors import ParameterError
+
+    numbers = parse.numbers(text) if text else ()
+    for k in numbers:
+        if k not in range(count):
+            raise ParameterError(f"--leave {text}: there is no photograph {k:g}; there are 0 to {count - 1}.")
+    left = [int(k) for k in dict.fromkeys(numbers)]
+    if len(left) == count:
+        raise ParameterError(f"--leave {text}: all photographs are left out; keep one or more.")
+    return left
 
 
 def _shaped(scene: Capture, kept: list[int]) -> Capture:
@@ -111,6 +130,8 @@ def _shaped(scene: Capture, kept: list[int]) -> Capture:
     import gonio as gn
 
     some = scene.select(kept) if len(kept) > 3 else scene
+    if len(kept) <= 3:
+        typer.echo("normals are of all photographs: those that are kept are too few", err=True)
     with bar("normals") as progress:
         relief = gn.photometric_stereo(some, progress=progress)
     found = np.isfinite(relief.error) & (relief.normals[..., 2] > 0.05)
@@ -119,7 +140,7 @@ def _shaped(scene: Capture, kept: list[int]) -> Capture:
 
 def _places(scene: Capture) -> np.ndarray:
     """Where sites lie in the image's plane, the longer side of the object from 0 to 1 (RS 7)."""
-    at = scene.sites.positions[:, :2]
+    at = scene.sites.positions @ scene.camera.pose[:3, :2]
     low, high = at.min(axis=0), at.max(axis=0)
     places: np.ndarray = (at - low) / max(float((high - low).max()), 1e-30)
     return places
@@ -147,5 +168,6 @@ def _predicted(scene: Capture, thing: Relightable, k: int) -> tuple[np.ndarray, 
     photograph, clipped = scene.photographs.read(k)
     image = gn.relight(thing, scene.lights[k])
     some = scene.mask & ~clipped
-    off = np.sqrt(np.mean((image[some] - photograph[some]) ** 2) / np.mean(photograph[some].astype(float) ** 2))
+    total = np.mean(photograph[some].astype(float) ** 2)
+    off = np.sqrt(np.mean((image[some] - photograph[some]) ** 2) / total) if total > 0 else 0.0
     return np.where(scene.mask[..., None], photograph, 0), image, float(off)

@@ -53,7 +53,8 @@ def write_relightable(path: str | os.PathLike[str], thing: Relightable, made: st
     arrays["mask"] = view.mask
     arrays |= {name: getattr(view, name)[view.mask].astype(np.float32) for name in _VIEW}
     if thing.shape is not None:
-        arrays |= {name: to_numpy(getattr(thing.shape, name)) for name in ("vertices", "faces", "uv")}
+        of = {name: getattr(thing.shape, name) for name in ("vertices", "faces", "uv")}
+        arrays |= {name: to_numpy(array) for name, array in of.items() if array is not None}
     write_archive(path, _KIND, _VERSION, {"made": made, "terms": terms}, arrays)
 
 
@@ -68,7 +69,8 @@ def read_relightable(path: str | os.PathLike[str]) -> Relightable:
         material = models[0] if len(models) == 1 else Sum(models)
         shape = None
         if "vertices" in arrays:
-            shape = Mesh(*(_array(path, arrays, name) for name in ("vertices", "faces", "uv")))
+            vertices, faces = (_array(path, arrays, name) for name in ("vertices", "faces"))
+            shape = Mesh(vertices, faces, arrays.get("uv"))
         return Relightable(_view(path, arrays), material, shape)
     except FileError:
         raise

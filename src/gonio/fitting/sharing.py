@@ -9,8 +9,8 @@ of each site's samples (RS 14, 8.1), for texture that is finer than sharing coul
 RS interpolates f itself, over (u, v). Its logarithm is smoother and stays positive, and |v| adds the symmetry of
 isotropic materials: for the same 600 centres the error of held-out samples falls from .076 to .0044 (`logarithm`,
 `folded`; without both it is the paper's). RS interpolates at the centres; least squares of many samples more is what
-photographs want, with their noise, edges and shadows (`smooth`). At theta_d = 0 phi_d has no meaning: such samples
-enter at eight angles.
+photographs want, with their noise, edges and shadows (`smooth`); samples that are far off count little. At theta_d = 0
+phi_d has no meaning: such samples enter at eight angles, folded at five.
 
 Not here: the solve (`radial_basis`, `smoothing`), the choice of centres (`centres`), and of scales (`validation`).
 """
@@ -24,7 +24,7 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Array, to_numpy
+from ..arrays import Array, require_finite, to_numpy
 from ..brdf.combine import Scaled
 from ..brdf.model import BRDF
 from ..brdf.radial import Radial
@@ -40,7 +40,10 @@ from .validation import choose_scales
 _MOST = 1_100_000  # samples that are looked at: more tell no more
 _SINGLE = 1e-3  # range of w within which a photograph is of one theta_d
 _BACK = 0.01  # theta_d, radians, below which phi_d has no meaning
-_DARKEST = 1e-3  # of the median reflectance: below it noise is all there is
+_STIFF = 0.03  # where nothing tells how noisy samples are
+_AGAIN = 2  # fits with weights by the one before
+_USUAL = 0.3  # log f that is off by less is no outlier
+_DARKEST = 1e-3  # of the median reflectance that is above 0: below it noise is all there is
 _LEAST_AND_MOST = 0.05, 4.0  # weights, of the median: no highlight is all there is, nor does any dark count for nothing
 
 
@@ -100,11 +103,12 @@ def share_reflectance(
     flat = float(np.ptp(q[:, -1])) < _SINGLE
     if flat:
         q = q[:, :-1]
-    target, weights = values[at], table.wi[at, 2]
+    target, light = values[at], table.wi[at, 2]
+    weights = light
     if logarithm:
-        target = np.log(np.maximum(target, _DARKEST * np.median(target, axis=0)))
-        radiance = weights * table.value[at].mean(axis=1)
-        weights = np.clip(radiance / np.median(radiance), *_LEAST_AND_MOST)
+        target = np.log(np.maximum(target, _DARKEST * _ordinary(target)))
+        light = light if albedo is None else light * albedo[table.site[at]].mean(axis=1)
+        weights = _bright(light * np.exp(target).mean(axis=1))
     spatial = places is not None
     chosen = scales
     if chosen is None:
@@ -116,6 +120,9 @@ def share_reflectance(
     interpolant = found.interpolant
     if smooth:
         interpolant = smoothed(interpolant, q, target, weights, chosen.stiffness, seed)
+        for _ in range(_AGAIN if logarithm else 0):
+            trusted = _trusted(interpolant(q), target, light)
+            interpolant = smoothed(interpolant, q, target, trusted, chosen.stiffness, seed)
     x, y = (None, None) if places is None else to_numpy(places).astype(np.float64).T
     material: BRDF = Radial(interpolant, logarithm=logarithm, folded=folded, flat=flat, x=x, y=y)
     if albedo is not None:
@@ -162,9 +169,8 @@ def _collected(samples: Iterable[ReflectanceSamples], places: Array | None, seed
         at = to_numpy(places).astype(np.float64)
         if at.ndim != 2 or at.shape[1] != 2 or len(at) <= site.max():
             raise ArrayError(f"places have shape {at.shape}; ({site.max() + 1} or more sites, 2) is wanted.")
+        require_finite(at, "places")
         place = at[site]
-        if not np.isfinite(place).all():
-            raise ArrayError("places are not finite at sites that have samples.")
     return _Table(wi, wo, np.maximum(value, 0), site, group, place)
 
 
@@ -175,10 +181,10 @@ def _thinned(part: tuple[Any, ...], share: float) -> tuple[Any, ...]:
 
 
 def _albedo(table: _Table, places: Array | None) -> np.ndarray:
-    """The median of each site's samples (S, 3), of all where a site has none or is black."""
+    """The median of each site's samples (S, 3), of all where a site has none; where it is black, near it."""
     if places is None:
         raise ParameterError("texture gives each site its own colour: places are wanted, to tell the sites apart.")
-    overall = np.maximum(np.median(table.value, axis=0), np.finfo(float).tiny)
+    overall = _ordinary(table.value)
     albedo = np.tile(overall, (len(to_numpy(places)), 1))
     for c in range(albedo.shape[1]):
         order = np.lexsort((table.value[:, c], table.site))
@@ -189,15 +195,23 @@ def _albedo(table: _Table, places: Array | None) -> np.ndarray:
     return albedo
 
 
+def _ordinary(value: np.ndarray) -> np.ndarray:
+    """The median of what is above 0 in each channel (C,) of values (M, C), some of which are; in all where none is."""
+    every = np.median(value[value > 0])
+    return np.array([np.median(channel[channel > 0]) if (channel > 0).any() else every for channel in value.T])
+
+
 def _entered(table: _Table, folded: bool) -> tuple[np.ndarray, np.ndarray]:
-    """q (M, d), and the sample that each is of (M,): those at theta_d = 0 come at eight angles."""
+    """q (M, d), and the sample that each is of (M,): those at theta_d = 0 come at all angles."""
     angles = uvw(table.wi, table.wo)
     back = np.flatnonzero(angles[:, 2] < _BACK * 2 / math.pi)
+    s, w = np.hypot(angles[back, 0], angles[back, 1]), angles[back, 2]
+    angles[back] = np.stack((s, 0 * s, w), axis=-1)
     parts, at = [angles], [np.arange(len(angles))]
-    for turn in range(1, 8) if back.size else ():
-        c, s = math.cos(turn * math.pi / 4), math.sin(turn * math.pi / 4)
-        u, v, w = angles[back].T
-        parts.append(np.stack((c * u - s * v, s * u + c * v, w), axis=-1))
+    # By eighths of a circle; folded, half of it is all there is.
+    for turn in range(1, 5 if folded else 8):
+        phi = turn * math.pi / 4
+        parts.append(np.stack((s * math.cos(phi), s * math.sin(phi), w), axis=-1))
         at.append(back)
     q, sample = np.concatenate(parts), np.concatenate(at)
     if folded:
@@ -205,6 +219,19 @@ def _entered(table: _Table, folded: bool) -> tuple[np.ndarray, np.ndarray]:
     if table.place is not None:
         q = np.concatenate((table.place[sample], q), axis=1)
     return q, sample
+
+
+def _bright(radiance: np.ndarray) -> np.ndarray:
+    """Weights (M,) by radiance, of its median where it is above 0: errors of bright pixels are seen more."""
+    return np.asarray(np.clip(radiance / np.median(radiance[radiance > 0]), *_LEAST_AND_MOST))
+
+
+def _trusted(fitted: np.ndarray, target: np.ndarray, light: np.ndarray) -> np.ndarray:
+    """Weights (M,) by the radiance that was fitted, less where the sample is far from it (Cauchy): what is far too
+    bright has no say in its own weight."""
+    off = np.sqrt(np.mean((target - fitted) ** 2, axis=1))
+    usual = max(3 * 1.4826 * float(np.median(off)), _USUAL)
+    return np.asarray(_bright(light * np.exp(fitted).mean(axis=1)) / (1 + (off / usual) ** 2))
 
 
 def _diagonal(scales: Scales, spatial: bool, flat: bool) -> np.ndarray:
@@ -217,11 +244,11 @@ def _validated(
 ) -> Scales:
     """Scales by leaving photographs out; with one photograph, those that RS used."""
     if len(np.unique(group)) < 2:
-        return Scales()
+        return Scales(stiffness=_STIFF)
     try:
         found = choose_scales(q, target, group, weights, seed=seed)
     except ArrayError:  # with a photograph less there is one theta_d: nothing tells how far to trust another
-        return Scales()
+        return Scales(stiffness=_STIFF)
     space = found.scales[0] if spatial else Scales.space
     return Scales(float(space), Scales.difference if flat else float(found.scales[-1]), found.rho)
 

@@ -22,7 +22,7 @@ from ..arrays import to_numpy
 from ..brdf.radial import Interpolant
 
 _EACH = 20  # samples for each centre
-_WORK = 3e11  # products that may be summed before fewer samples are taken, to no less than four a centre
+_WORK = 1e11  # products that may be summed before fewer samples are taken, to no less than four a centre
 _BLOCK = 4096
 _RIDGE = 1e-10  # of the diagonal's mean: what rounding leaves of directions that no sample tells about
 
@@ -37,7 +37,9 @@ def smoothed(
     some = np.random.default_rng(seed).permutation(len(points))[:m]
     Q, g, w = points[some] * interpolant.scales, values[some], weights[some]
     w = w * np.sqrt(n / np.sum(w**2))
-    P = np.column_stack((np.ones(n), C))
+    # About the middle, as large as 1, since places may lie far from their origin.
+    middle, extent = (C.max(axis=0) + C.min(axis=0)) / 2, np.ptp(C, axis=0) / 2
+    P = np.column_stack((np.ones(n), (C - middle) / extent))
     order = qr(P.T, mode="r", pivoting=True)[1]
     T, rest = order[:p], order[p:]
     A = np.linalg.solve(P[T].T, P[rest].T).T
@@ -45,7 +47,8 @@ def smoothed(
     for low in range(0, m, _BLOCK):
         q = Q[low : low + _BLOCK]
         R = cdist(q, C)
-        basis = np.column_stack((R[:, rest] - R[:, T] @ A.T, np.ones(len(q)), q)) * w[low : low + _BLOCK, None]
+        plane = np.ones(len(q)), (q - middle) / extent
+        basis = np.column_stack((R[:, rest] - R[:, T] @ A.T, *plane)) * w[low : low + _BLOCK, None]
         gram += basis.T @ basis
         moment += basis.T @ (g[low : low + _BLOCK] * w[low : low + _BLOCK, None])
     Psi = cdist(C, C)
@@ -55,4 +58,7 @@ def smoothed(
     x = cho_solve(cho_factor(gram, overwrite_a=True), moment)
     coefficients = np.empty((n, g.shape[1]))
     coefficients[rest], coefficients[T] = x[: n - p], -A.T @ x[: n - p]
-    return dataclasses.replace(interpolant, coefficients=coefficients, polynomial=x[n - p :])
+    polynomial = x[n - p :]
+    polynomial[1:] /= extent[:, None]
+    polynomial[0] -= middle @ polynomial[1:]
+    return dataclasses.replace(interpolant, coefficients=coefficients, polynomial=polynomial)

@@ -25,7 +25,8 @@ def sharing_picture(
     figure = blank(3 * side, len(shown) * (side * rows / columns + 0.4) + 2.6)
     grid = figure.add_gridspec(len(shown) + 1, 3, height_ratios=[*[side * rows / columns + 0.4] * len(shown), 2.4])
     for k, (name, (photograph, image, off)) in enumerate(zip(names, shown, strict=True)):
-        bright = float(np.quantile(photograph.max(axis=2)[photograph.max(axis=2) > 0], 0.98))
+        lit = photograph.max(axis=2)[photograph.max(axis=2) > 0]
+        bright = float(np.quantile(lit, 0.98)) if lit.size else 1.0
         panels = {
             name: tone_map(photograph * (0.8 / bright), clipped),
             f"predicted, {100 * off:.1f} % off": tone_map(image * (0.8 / bright), clipped),
@@ -41,7 +42,7 @@ def sharing_picture(
     axes.loglog(count, residual, color="#d08a1c", marker=".", linewidth=1.2)
     axes.set_xlabel("centres", color=INK, fontsize=8)
     axes.set_ylabel("rms residual", color=INK, fontsize=8)
-    axes.tick_params(colors=INK, labelsize=7)
+    axes.tick_params(which="both", colors=INK, labelsize=7)
     for spine in axes.spines.values():
         spine.set_edgecolor(INK)
     return save(figure, path)

@@ -1,0 +1,182 @@
+"""`gonio share`: photographs that were left out are predicted; and `gonio render` of what it wrote."""
+
+import json
+import shutil
+
+import numpy as np
+import pytest
+
+import gonio as gn
+from gonio.capture.photographs import Held
+from gonio.cli import main
+from gonio.cli.share import _places
+from gonio.viewer.sharing import sharing_picture
+
+BRDF = ("--brdf", "lambert:albedo=.5/.4/.3", "--brdf", "ggx:alpha=.4,eta=1.5")
+
+
+def run(capsys, *arguments):
+    """(exit code, stdout, stderr)."""
+    with pytest.raises(SystemExit) as left:
+        main([str(argument) for argument in arguments])
+    said = capsys.readouterr()
+    return left.value.code, said.out, said.err
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A ball of plastic under nine lights, 32 x 32, in codes of 16 bits."""
+    path = tmp_path_factory.mktemp("ball") / "ball"
+    with pytest.raises(SystemExit):
+        main(["simulate", "-o", str(path), *BRDF, "--count", "9", "--size", "32"])
+    return path
+
+
+@pytest.fixture(scope="module")
+def thing(folder):
+    """What is shared between all pixels of the ball, from eight of the photographs."""
+    path = folder.parent / "thing.gonio"
+    with pytest.raises(SystemExit):
+        main(["share", str(folder), "-o", str(path), "--leave", "4", "--centres", "200", "--scales", ".2,.5"])
+    return path
+
+
+@pytest.mark.parametrize(
+    ("how", "most"), [("", 0.01), ("--homogeneous", 0.005), ("--texture", 0.03), ("--paper", 0.015)]
+)
+def test_photographs_left_out_are_predicted(capsys, tmp_path, folder, how, most):
+    output, picture = tmp_path / "thing.gonio", tmp_path / "seen.png"
+    arguments = ("--leave", "4,1", "--centres", 300, "--scales", ".2,.5,.01", "--json")
+    how = [how] if how else ["--picture", picture]
+    code, out, err = run(capsys, "share", folder, "-o", output, *how, *arguments)
+    assert code == 0, err
+    facts = json.loads(out)
+    assert (facts["photographs"], facts["centres"], facts["m_xy, m_w, rho"]) == (7, 300, [0.2, 0.5, 0.01])
+    errors = [facts["error of photo4.png"], facts["error of photo1.png"]]
+    assert facts["median of them"] == pytest.approx(np.median(errors))
+    # 300 centres of a smooth material leave a few thousandths, codes of 16 bits less. A median of seven samples holds
+    # more or less of the gloss from pixel to pixel.
+    assert max(errors) < most
+    assert facts["residual"] < most
+    assert not how[1:] or gn.image_info(picture).columns > 600
+    # What is written predicts the same.
+    capture, read = gn.read_capture(folder), gn.read_relightable(output)
+    image, photograph = gn.relight(read, capture.lights[4]), capture.photographs.read(4).radiance
+    kept = capture.mask & ~capture.photographs.read(4).clipped
+    off = np.sqrt(np.mean((image - photograph)[kept] ** 2) / np.mean(photograph[kept] ** 2))
+    assert off == pytest.approx(errors[0], rel=0.01)
+
+
+def test_people_read_a_table_and_the_file(capsys, tmp_path, folder):
+    output = tmp_path / "thing.gonio"
+    code, out, _ = run(capsys, "share", folder, "-o", output, "--homogeneous", "--centres", 40, "--scales", "1,.5")
+    lines = out.splitlines()
+    assert code == 0
+    assert lines[-1] == str(output)
+    assert "9" in lines[0] and "photographs" in lines[0]
+    assert "error of" not in out
+
+
+def test_what_was_shared_is_rendered_under_other_light(capsys, tmp_path, thing):
+    seen = gn.read_relightable(thing)
+    sun, image = gn.Directional(gn.normalise([1.0, 0, 1]), [2.0, 1.0, 0.5]), tmp_path / "image.exr"
+    code, out, err = run(capsys, "render", thing, "-o", image, "--sun", "1,0,1:2/1/.5")
+    assert (code, out) == (0, f"{image}\n"), err
+    np.testing.assert_allclose(gn.read_image(image), gn.relight(seen, sun), rtol=1e-3, atol=1e-6)
+    gn.write_image(tmp_path / "sky.exr", np.full((16, 32, 3), 0.5))
+    code, _, err = run(capsys, "render", thing, "-o", image, "--light", tmp_path / "sky.exr", "--samples", 64)
+    assert code == 0, err
+    # Matte .5 .4 .3 under a gloss of 4 %, in a room of .5.
+    assert gn.read_image(image).shape == (32, 32, 3)
+    np.testing.assert_allclose(gn.read_image(image)[16, 16], 0.5 * np.array([0.54, 0.44, 0.34]), rtol=0.1)
+    code, _, _ = run(capsys, "render", thing, "-o", tmp_path / "image.png", "--sun", "0,0,1:3")
+    assert code == 0
+    assert gn.read_image(tmp_path / "image.png", encoding="srgb").max() > 0.1
+
+
+def test_a_capture_without_normals_goes_through_photometric_stereo(capsys, tmp_path, folder):
+    bare = tmp_path / "bare"
+    shutil.copytree(folder, bare, ignore=shutil.ignore_patterns("normals.png", "truth", "*.toml"))
+    output = tmp_path / "thing.gonio"
+    arguments = ("--homogeneous", "--leave", 4, "--centres", 100, "--scales", "1,.5", "--json")
+    code, out, err = run(capsys, "share", bare, "-o", output, *arguments, "--encoding", "linear")
+    assert code == 0, err
+    assert "normals by photometric stereo" in err
+    # Highlights turn the normals that a matte model finds by some degrees.
+    assert json.loads(out)["error of photo4.png"] < 0.2
+    view = gn.read_relightable(output).view
+    truth = gn.read_capture(folder)
+    both = view.mask & truth.mask
+    off = np.degrees(np.arccos(np.sum(view.normal[both] * truth.normals[both], axis=1).clip(-1, 1)))
+    assert np.median(off) < 5
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--leave", "9"), "no photograph 9; there are 0 to 8"),
+        (("--leave", "0,-1"), "no photograph -1"),
+        (("--leave", "0.5"), "no photograph 0.5"),
+        (("--leave", "nan"), "no photograph nan"),
+        (("--leave", "a"), "'a' is not numbers"),
+        (("--leave", "0,1,2,3,4,5,6,7,8"), "all photographs are left out"),
+        (("--scales", "1"), "m_xy,m_w or m_xy,m_w,rho"),
+        (("--scales", "1,2,3,4"), "m_xy,m_w or m_xy,m_w,rho"),
+        (("--scales", "1,0"), "positive"),
+        (("--scales", "1,x"), "'1,x' is not numbers"),
+        (("--least", "2"), "least = 2"),
+        (("--texture", "--homogeneous"), "places are wanted"),
+        (("--centres", "4"), "centres"),
+        (("--picture", "seen.jpg"), "end its name in .png"),
+        (("--output", "thing.exr"), "end its name in .gonio"),
+    ],
+)
+def test_bad_use_is_one_line_and_leaves_no_file(capsys, tmp_path, folder, arguments, message):
+    output = tmp_path / "thing.gonio"
+    code, out, err = run(capsys, "share", folder, "-o", output, *arguments)
+    assert (code, out) == (2, "")
+    assert message in err
+    assert len(err.strip().splitlines()) == 1
+    assert not output.exists()
+
+
+def test_a_file_that_holds_no_thing_is_refused(capsys, tmp_path):
+    for name, data in (("none.gonio", None), ("no.gonio", b"not a ZIP")):
+        if data:
+            (tmp_path / name).write_bytes(data)
+        code, _, err = run(capsys, "render", tmp_path / name, "-o", tmp_path / "a.exr")
+        assert code == 2
+        assert name in err and len(err.strip().splitlines()) == 1
+
+
+def test_lights_can_be_given_beside_and_are_wanted(capsys, tmp_path, folder):
+    (tmp_path / "few.lp").write_text("1\na.png 0 0 1\n")
+    code, _, err = run(capsys, "share", folder, "-o", tmp_path / "a.gonio", "--lights", tmp_path / "few.lp")
+    assert code == 2
+    assert "1 lights for 9 photographs" in err
+    dark = tmp_path / "dark"
+    dark.mkdir()
+    for k in range(2):
+        shutil.copy(folder / f"photo{k}.png", dark)
+    code, _, err = run(capsys, "share", dark, "-o", tmp_path / "a.gonio", "--encoding", "linear")
+    assert code == 2
+    assert "lights" in err.splitlines()[-1]
+
+
+def test_places_lie_in_the_image_whichever_way_the_camera_looks():
+    # A wall that stands up, whose places in the world share one y.
+    x, z = np.array([[-1.0, 1, 1, -1], [0, 0, 1, 1]])
+    wall = gn.Mesh(np.stack((x, 0 * x, z), axis=1), np.array([[0, 1, 2], [0, 2, 3]]))
+    camera = gn.Pinhole.look_at((0, -4, 0.5), (0, 0, 0.5), 40, (12, 16))
+    capture = gn.Capture(Held(np.ones((1, 12, 16, 3))), shape=wall, camera=camera)
+    places, (row, column) = _places(capture), np.nonzero(capture.mask)
+    assert places.min(axis=0).tolist() == [0, 0] and places.max() == 1
+    # x to the right and y down, by one step a pixel.
+    step = 1 / np.ptp(column)
+    np.testing.assert_allclose(places, step * np.stack((column - column.min(), row - row.min()), axis=1), atol=1e-9)
+
+
+def test_a_picture_is_made_of_black_photographs_too(tmp_path):
+    black, gray = np.zeros((8, 6, 3), np.float32), np.full((8, 6, 3), 0.2, np.float32)
+    sharing_picture(tmp_path / "a.png", ["a"], [(black, gray, 1.0)], ())
+    assert gn.image_info(tmp_path / "a.png").columns > 600
