@@ -96,9 +96,9 @@ def lafortune(lobes: int) -> tuple[object, list[float]]:
     def model(p: np.ndarray) -> BRDF:
         total: BRDF = gn.Lambert(min(abs(p[0]), 1.0))
         for k in range(lobes):
-            cx, cz = np.clip(p[1 + 3 * k : 3 + 3 * k], -3, 3)
+            cx, cz = np.clip(p[1 + 3 * k : 3 + 3 * k], -1.02, 1.02)
             n = p[3 + 3 * k]
-            total = total + gn.Lafortune(float(cx), float(cx), float(cz), float(np.clip(abs(n), 0.1, 2000)))
+            total = total + gn.Lafortune(float(cx), float(cx), float(cz), float(np.clip(abs(n), 0.1, 300)))
         return total
 
     start = [0.1]
