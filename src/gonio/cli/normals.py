@@ -45,11 +45,10 @@ def normals(
         from gonio.capture.semicalibrated import estimate_strengths
 
         told = estimate_strengths(scene)
-        typer.echo(f"{capture}: strengths of the lights: {told.reason}", err=True)
         if told.converged:
             scene = dataclasses.replace(scene, lights=told.lights)
         else:
-            typer.echo(f"{capture}: strengths are left as they were told", err=True)
+            typer.echo(f"{capture}: strengths of lights are left as they were told: {told.reason}", err=True)
     output.mkdir(parents=True, exist_ok=True)
     names = ("normals.png", "relief.exr", "relief.png")
     for name in names:
