@@ -40,6 +40,8 @@ from .validation import choose_scales
 _MOST = 1_100_000  # samples that are looked at: more tell no more
 _SINGLE = 1e-3  # range of w within which a photograph is of one theta_d
 _BACK = 0.01  # theta_d, radians, below which phi_d has no meaning
+_GRAZING = 0.15  # cosine of light below which noise is most of what f is
+_LIT = 0.2  # sum of a site's squared cosines below which its colour may be noise
 _STIFF = 0.03  # where nothing tells how noisy samples are
 _AGAIN = 2  # fits with weights by the one before
 _USUAL = 0.3  # log f that is off by less is no outlier
@@ -103,7 +105,8 @@ def share_reflectance(
     flat = float(np.ptp(q[:, -1])) < _SINGLE
     if flat:
         q = q[:, :-1]
-    target, light = values[at], table.wi[at, 2]
+    target, cosine = values[at], table.wi[at, 2]
+    light = cosine
     weights = light
     if logarithm:
         target = np.log(np.maximum(target, _DARKEST * _ordinary(target)))
@@ -123,6 +126,10 @@ def share_reflectance(
         for _ in range(_AGAIN if logarithm else 0):
             trusted = _trusted(interpolant(q), target, light)
             interpolant = smoothed(interpolant, q, target, trusted, chosen.stiffness, seed)
+    # What grazing light makes of noise is no reflectance to end at.
+    steep = cosine > _GRAZING
+    some = target[steep] if steep.any() else target
+    interpolant = dataclasses.replace(interpolant, limits=np.stack((some.min(axis=0), some.max(axis=0))))
     x, y = (None, None) if places is None else to_numpy(places).astype(np.float64).T
     material: BRDF = Radial(interpolant, logarithm=logarithm, folded=folded, flat=flat, x=x, y=y)
     if albedo is not None:
@@ -181,7 +188,8 @@ def _thinned(part: tuple[Any, ...], share: float) -> tuple[Any, ...]:
 
 
 def _albedo(table: _Table, places: Array | None) -> np.ndarray:
-    """The median of each site's samples (S, 3), of all where a site has none; where it is black, near it."""
+    """The median of each site's samples (S, 3), weighted by their cosine, squared: radiance is as noisy at all. Of all
+    where a site has none, at most of all where light grazes it alone; where it is black, near it."""
     if places is None:
         raise ParameterError("texture gives each site its own colour: places are wanted, to tell the sites apart.")
     overall = _ordinary(table.value)
@@ -189,9 +197,12 @@ def _albedo(table: _Table, places: Array | None) -> np.ndarray:
     for c in range(albedo.shape[1]):
         order = np.lexsort((table.value[:, c], table.site))
         site, first, count = np.unique(table.site[order], return_index=True, return_counts=True)
-        middle = table.value[order, c]
-        median = (middle[first + (count - 1) // 2] + middle[first + count // 2]) / 2
-        albedo[site, c] = np.where(median > _DARKEST * overall[c], median, _DARKEST * overall[c])
+        total = np.concatenate(([0.0], np.cumsum(table.wi[order, 2] ** 2)))
+        half = (total[first] + total[first + count]) / 2
+        at = np.clip(np.searchsorted(total, half) - 1, first, first + count - 1)
+        lit = total[first + count] - total[first] > _LIT
+        found = np.maximum(table.value[order[at], c], _DARKEST * overall[c])
+        albedo[site, c] = np.where(lit, found, np.minimum(found, overall[c]))
     return albedo
 
 
