@@ -5,7 +5,8 @@
 DATA holds photometric/uw, photometric/xiong, rti/real and rti/synth (docs: CONTRIBUTING). FOLDER gets real.csv,
 real.png and a picture of each object. Normals are photometric stereo's of the photographs that are kept: all but three,
 or six of them. Errors are relative rms of radiance over the mask, clipped pixels aside. Encodings are those under which
-photometric stereo leaves least. rti/synth is rendered: kept are 49 lights of its dome, predicted three of its test.
+photometric stereo of all photographs leaves least; Object2 has that of Object1. Lights are taken to be equally strong.
+rti/synth is rendered: kept are 49 lights of its dome or six of them, predicted three of its test.
 
 Rivals: Lambert; polynomial texture maps (Malzbender, Gelb and Wolters 2001); linear radial functions of (lx, ly) by
 pixel; an albedo by pixel and one GGX lobe for all of them.
