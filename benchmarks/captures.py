@@ -77,6 +77,16 @@ def ingest(folder: Path, repetitions: int) -> None:
         )
         print(f"ingest {taken['ingest'] / 1e3:.2f} s, {taken['ingest'] / taken['decoding']:.1f} times")
         stored = gn.read_capture(copy, partial=True).photographs
+        flat = np.broadcast_to((0.0, 0.0, 1.0), (rows, columns, 3))
+        lights = gn.distant_lights(np.tile([[0.0, 0.6, 0.8]], (len(files.names), 1)))
+        samples = gn.Capture(stored, lights, normals=flat).reflectance()
+        parts = list(stored.parts(np.arange(rows * columns), 16384))
+        works = {
+            "all lights of a site": lambda: [samples.at(part) for part in parts],
+            "a photograph": lambda: list(samples),
+        }
+        for name, value in times(works, repetitions).items():
+            print(f"  samples by {name}: {value / taken['decoding']:.1f} times decoding")
         at = (np.arange(64)[:, None] * columns + np.arange(64)).ravel()
         for name, value in times({"store": lambda: stored.pixels(at), "files": lambda: files.pixels(at)}, 5).items():
             print(f"  all lights of 64 x 64 pixels from the {name}: {value / 1e3:.3f} s")
