@@ -9,8 +9,8 @@ half of its distance from x. So no radiance is mixed over an edge with what lies
 
 Sites are points of the shape, in the world of the cameras: the vertices of a mesh, or texels over its uv. Where the
 object turns and the camera stands, cameras are told as seen from the object, and so are lights. Not here: finding the
-cameras (COLMAP does), shapes that are off: there the rim is painted with background, which a
-smaller `grazing` leaves out.
+cameras (COLMAP does), shapes that are off: there the rim is painted with background, which a smaller `grazing` leaves
+out.
 """
 
 from __future__ import annotations
@@ -31,6 +31,7 @@ from ..frames import frame
 from ..lights.model import Light
 from ..shapes.atlas import atlas
 from ..shapes.mesh import Mesh
+from ..shapes.view import View
 from .lighting import directions_of, require_single
 from .photographs import Photographs
 from .sites import Observation, Sites
@@ -89,7 +90,7 @@ class Turntable:
         """(rows, columns) bool: the texels that some face covers, whose rows the sites are counted along."""
         if self.texels is None or self.shape is None:
             raise ArrayError("sites are vertices, which have no mask: give texels.")
-        return atlas(self.shape, self.texels).mask
+        return self._atlas.mask
 
     @cached_property
     def sites(self) -> Sites:
@@ -97,7 +98,7 @@ class Turntable:
         if self.shape is None:
             raise ArrayError("the capture's shape is unknown: dataclasses.replace(capture, shape=read_mesh(...)).")
         if self.texels is not None:
-            view = atlas(self.shape, self.texels)
+            view = self._atlas
             return Sites(view.position[view.mask], view.lifted[view.mask], view.frames[view.mask])
         normals = np.asarray(self.shape.normals, dtype=np.float64)
         low, high = self.shape.bounds
@@ -127,6 +128,11 @@ class Turntable:
         from .sampling import radiance
 
         return radiance(self)
+
+    @cached_property
+    def _atlas(self) -> View:
+        assert self.shape is not None and self.texels is not None
+        return atlas(self.shape, self.texels)
 
     def _observe(self, k: int, sites: Sites) -> Observation:
         camera, shape = self.cameras[k], self.shape

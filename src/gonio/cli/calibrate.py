@@ -30,10 +30,8 @@ def calibrate(
     from gonio.files.whole import writable
 
     for path, suffix in ((output, ".lp"), (picture, ".png")):
-        if path and path.suffix.lower() != suffix:
-            raise FileError(f"{path}: end its name in {suffix}.")
         if path:
-            writable(path)
+            writable(path, suffix)
     scene = captures.read(ball, encoding, partial)
     names = scene.photographs.names
     if of is not None:

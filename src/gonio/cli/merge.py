@@ -43,10 +43,8 @@ def merge(
     if sum(map(bool, (response, encoding, recover))) > 1:
         raise ParameterError("--response, --encoding and --recover each say what codes mean: give one of them.")
     for path, suffix in ((output, ".exr"), (recover, ".toml"), (picture, ".png")):
-        if path and path.suffix.lower() != suffix:
-            raise FileError(f"{path}: end its name in {suffix}.")
         if path:
-            writable(path)
+            writable(path, suffix)
     seconds, note = _seconds(times, files)
     sensor = _noise(noise)
     divisor = gn.read_image(vignetting) if vignetting else None

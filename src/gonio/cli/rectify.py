@@ -60,9 +60,7 @@ def rectify(
     if output.exists() and any(output.iterdir() if output.is_dir() else [output]):
         raise FileError(f"{output} exists and is not empty: give a new folder.")
     if picture:
-        if picture.suffix.lower() != ".png":
-            raise FileError(f"{picture}: end its name in .png.")
-        writable(picture)
+        writable(picture, ".png")
     if bool(board) == bool(corners):
         raise ParameterError("give either --board with --boards and --flat, or --corners: one of them tells the plane.")
     if corners and not height:

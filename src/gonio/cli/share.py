@@ -44,17 +44,14 @@ def share(
     """Share reflectance between the pixels of a few photographs: radial functions of place and angle."""
     import numpy as np
 
-    from gonio.errors import FileError
     from gonio.files.relightable import write_relightable
     from gonio.files.whole import writable
     from gonio.fitting.sharing import share_reflectance
     from gonio.rendering.relight import Relightable
 
     for path, suffix in ((output, ".gonio"), (picture, ".png")):
-        if path and path.suffix.lower() != suffix:
-            raise FileError(f"{path}: end its name in {suffix}.")
         if path:
-            writable(path)
+            writable(path, suffix)
     given = _scales(scales)
     scene = captures.read(capture, encoding, partial, lights)
     left = _left_out(leave, len(scene.photographs))

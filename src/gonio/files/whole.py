@@ -43,8 +43,11 @@ def writing(path: str | os.PathLike[str]) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
-def writable(path: str | os.PathLike[str]) -> Path:
-    """The file that writing to `path` would make or replace, links followed. Raises `FileError` as `writing` does."""
+def writable(path: str | os.PathLike[str], suffix: str = "") -> Path:
+    """The file that writing to `path` would make or replace, links followed. Raises `FileError` as `writing` does, and
+    where the name has another suffix than the one that is asked for."""
+    if suffix and Path(path).suffix.lower() != suffix:
+        raise FileError(f"{path}: end its name in {suffix}.")
     target = Path(os.path.realpath(path))
     if target.is_dir():
         raise FileError(f"{path} is a folder. Give the name of a file to write.")

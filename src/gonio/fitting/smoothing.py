@@ -15,11 +15,12 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve, qr
+from scipy.linalg import cho_factor, cho_solve
 from scipy.spatial.distance import cdist
 
 from ..arrays import to_numpy
 from ..brdf.radial import Interpolant
+from .radial_basis import anchors
 
 _EACH = 20  # samples for each centre
 _WORK = 1e11  # products that may be summed before fewer samples are taken, to no less than four a centre
@@ -40,8 +41,8 @@ def smoothed(
     # About the middle, as large as 1, since places may lie far from their origin.
     middle, extent = (C.max(axis=0) + C.min(axis=0)) / 2, np.ptp(C, axis=0) / 2
     P = np.column_stack((np.ones(n), (C - middle) / extent))
-    order = qr(P.T, mode="r", pivoting=True)[1]
-    T, rest = order[:p], order[p:]
+    T = anchors(C)
+    rest = np.setdiff1d(np.arange(n), T)
     A = np.linalg.solve(P[T].T, P[rest].T).T
     gram, moment = np.zeros((n, n)), np.zeros((n, g.shape[1]))
     for low in range(0, m, _BLOCK):
