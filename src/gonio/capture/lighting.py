@@ -100,13 +100,31 @@ def scaled(light: Light, factor: Array) -> Light:
     raise ParameterError(f"{type(light).__name__} is not Directional, Point or Uneven.")
 
 
-def require_single(lights: Sequence[Light]) -> None:
-    """Raises `ParameterError` where a light is not one beam."""
+def directions_from(lights: Sequence[Light], place: np.ndarray) -> np.ndarray:
+    """(N, 3), unit: where each light stands, seen from `place` (3,)."""
+    return np.concatenate([arriving(light, place[None]).direction for light in lights])
+
+
+def span_space(directions: np.ndarray) -> bool:
+    """Whether three or more directions (N, 3) lie in no plane, to a thousandth."""
+    return len(directions) >= 3 and bool(np.linalg.svd(directions, compute_uv=False)[2] >= 1e-3)
+
+
+def one_each(lights: Sequence[Light] | None, photographs: int) -> tuple[Light, ...] | None:
+    """The lights, one for each photograph; None where unknown.
+
+    Raises `ArrayError` for another number of them, `ParameterError` where a light is not one beam.
+    """
+    if lights is None:
+        return None
+    if len(lights) != photographs:
+        raise ArrayError(f"{len(lights)} lights came for {photographs} photographs.")
     for k, light in enumerate(lights):
         if not isinstance(light, Directional | Point | Uneven):
             raise ParameterError(
                 f"lights[{k}] is {type(light).__name__}; a photograph's light is Directional, Point or Uneven."
             )
+    return tuple(lights)
 
 
 def _rows(x: Array, name: str) -> np.ndarray:

@@ -29,7 +29,7 @@ from ..frames import frame
 from ..lights.model import Light
 from ..reflection import varied
 from ..shapes.view import Shape, View
-from .lighting import directions_of, require_single
+from .lighting import directions_of, one_each
 from .photographs import Chosen, Photographs
 from .sites import Observation, Sites
 
@@ -64,11 +64,7 @@ class Capture:
 
     def __post_init__(self) -> None:
         n, size = len(self.photographs), tuple(self.photographs.size)
-        if self.lights is not None:
-            object.__setattr__(self, "lights", tuple(self.lights))
-            if len(self.lights) != n:
-                raise ArrayError(f"{len(self.lights)} lights came for {n} photographs.")
-            require_single(self.lights)
+        object.__setattr__(self, "lights", one_each(self.lights, n))
         camera: Camera | None = self.camera
         if camera is None:
             object.__setattr__(self, "camera", above(size))

@@ -19,7 +19,7 @@ import numpy as np
 from .._kernels import photometric_stereo as kernels
 from ..errors import ArrayError
 from ..reflection import processors
-from .lighting import arriving, directions_of
+from .lighting import arriving, directions_from, directions_of, span_space
 from .model import Capture
 
 _PIXELS = 4096  # solved at once
@@ -58,9 +58,7 @@ def photometric_stereo(
     if lights is None:
         raise ArrayError("the capture's lights are unknown. Calibrate them by a mirror ball, or give their directions.")
     at, n = np.flatnonzero(capture.mask), len(lights)
-    middle = np.mean(capture.positions[capture.mask], axis=0, keepdims=True)
-    towards = np.concatenate([arriving(light, middle).direction for light in lights])
-    if n < 3 or np.linalg.svd(towards, compute_uv=False)[2] < 1e-3:
+    if not span_space(directions_from(lights, np.mean(capture.positions[capture.mask], axis=0))):
         raise ArrayError(f"{n} lights, which do not span space: normals want three that are in no plane.")
     g, albedo = np.empty((at.size, 3)), np.empty((at.size, 3))
     residual, error, used = np.empty(at.size), np.empty(at.size), np.empty(at.size, np.intp)

@@ -26,7 +26,7 @@ import numpy as np
 from .._kernels import photometric_stereo as kernels
 from ..errors import ArrayError
 from ..lights.model import Light
-from .lighting import arriving, directions_of, scaled
+from .lighting import arriving, directions_from, directions_of, scaled, span_space
 from .model import Capture
 from .white import weighted_median
 
@@ -80,9 +80,7 @@ def estimate_strengths(capture: Capture, progress: Callable[[int, int], None] | 
         )
     if len(told) < 4:
         raise ArrayError(f"{len(told)} lights came; four are wanted, since three fit any strengths.")
-    middle = np.mean(capture.positions[capture.mask], axis=0, keepdims=True)
-    towards = np.concatenate([arriving(light, middle).direction for light in told])
-    if np.linalg.svd(towards, compute_uv=False)[2] < 1e-3:
+    if not span_space(directions_from(told, np.mean(capture.positions[capture.mask], axis=0))):
         raise ArrayError("all lights lie in a plane: strengths want lights that span space.")
     pixels = _Pixels.of(capture, progress)
     s = np.ones((len(told), 3))

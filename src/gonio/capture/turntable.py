@@ -32,7 +32,7 @@ from ..lights.model import Light
 from ..shapes.atlas import atlas
 from ..shapes.mesh import Mesh
 from ..shapes.view import View
-from .lighting import directions_of, require_single
+from .lighting import directions_of, one_each
 from .photographs import Photographs
 from .sites import Observation, Sites
 
@@ -65,16 +65,12 @@ class Turntable:
     def __post_init__(self) -> None:
         n, size = len(self.photographs), tuple(self.photographs.size)
         object.__setattr__(self, "cameras", tuple(self.cameras))
-        for name in ("cameras", "lights"):
-            given = getattr(self, name)
-            if given is not None and len(given) != n:
-                raise ArrayError(f"{len(given)} {name} came for {n} photographs.")
+        if len(self.cameras) != n:
+            raise ArrayError(f"{len(self.cameras)} cameras came for {n} photographs.")
         for k, camera in enumerate(self.cameras):
             if camera.size != size:
                 raise ArrayError(f"cameras[{k}] has {camera.size} pixels, the photographs {size}.")
-        if self.lights is not None:
-            object.__setattr__(self, "lights", tuple(self.lights))
-            require_single(self.lights)
+        object.__setattr__(self, "lights", one_each(self.lights, n))
         if not 0 < self.grazing <= 90:
             raise ParameterError(f"grazing = {self.grazing:g} lies outside (0, 90] degrees.")
         if self.texels is not None and (self.shape is None or self.shape.uv is None):

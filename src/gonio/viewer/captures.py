@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..capture.circles import Circle
-from ..capture.lighting import arriving, is_near
+from ..capture.lighting import directions_from, is_near
 from ..capture.model import Capture
 from ..capture.photometric_stereo import Relief
 from ..capture.turntable import Turntable
@@ -105,8 +105,7 @@ def _towards(capture: Capture | Turntable) -> tuple[str, np.ndarray | None]:
     if capture.lights is None:
         return "", None
     near = "near lights" if any(map(is_near, capture.lights)) else "lights"
-    middle = np.nanmean(capture.positions[capture.mask], axis=0)[None]
-    return near, np.concatenate([arriving(light, middle).direction for light in capture.lights])
+    return near, directions_from(capture.lights, np.nanmean(capture.positions[capture.mask], axis=0))
 
 
 def _directions(axes: Any, directions: Any, chosen: np.ndarray, title: str) -> None:
