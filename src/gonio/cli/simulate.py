@@ -51,6 +51,7 @@ def simulate(
     import numpy as np
 
     import gonio as gn
+    from gonio.capture.lighting import directions_of
     from gonio.errors import FileError, ParameterError
 
     if output.exists() and any(output.iterdir() if output.is_dir() else [output]):
@@ -68,22 +69,21 @@ def simulate(
     if views and len(arriving) < views:
         raise FileError(f"{lights} has {len(arriving)} lights for {views} views.")
     arriving = arriving[: views or None]
-    ideal = _captured(solid, material, arriving, views, size, gn.Sensor(), shadows, 0.0, seed, centre, radius)
+    capture = _captured(solid, material, arriving, views, size, shadows, misaligned, seed, centre, radius)
     if exposure <= 0:
-        exposure = _BRIGHT / _brightest(ideal)
+        exposure = _BRIGHT / _brightest(capture)
     sensor = gn.Sensor(exposure, gain, read, bits)
     sensors = [dataclasses.replace(sensor, exposure=exposure * m) for m in multiples]
-    capture = _captured(solid, material, arriving, views, size, sensor, shadows, misaligned, seed, centre, radius)
     (output / "truth").mkdir(parents=True)
     names = _write(output, capture, sensors)
     made = {"shape": shape, "brdf": brdf, "sensor": dataclasses.asdict(sensor), "shadows": shadows, "seed": seed}
     if near:
-        made["positions"] = [light.position.tolist() for light in ideal.lights or () if isinstance(light, gn.Point)]
+        made["positions"] = [light.position.tolist() for light in arriving if isinstance(light, gn.Point)]
     (output / "truth" / "made.json").write_text(json.dumps(made, indent=1), "utf-8")
-    if ideal.directions is not None:
-        gn.write_lp(output / "truth" / "dirs.lp", names, ideal.directions)
+    if capture.directions is not None:
+        gn.write_lp(output / "truth" / "dirs.lp", names, np.asarray(directions_of(arriving)))
         if not views:
-            gn.write_lp(output / "dirs.lp", names, np.asarray(capture.directions))
+            gn.write_lp(output / "dirs.lp", names, capture.directions)
     rows, columns = capture.photographs.size
     typer.echo(f"{len(capture.photographs)} photographs of {columns} x {rows} in {output}")
 
@@ -133,7 +133,6 @@ def _captured(
     arriving: list[Light],
     views: int,
     size: int,
-    sensor: Sensor,
     shadows: bool,
     misaligned: float,
     seed: int,
@@ -146,7 +145,7 @@ def _captured(
 
     if not views:
         camera = from_above(solid, size)
-        return gn.simulate(solid, material, arriving, camera, sensor, shadows=shadows, misaligned=misaligned, seed=seed)
+        return gn.simulate(solid, material, arriving, camera, shadows=shadows, misaligned=misaligned, seed=seed)
     if not isinstance(solid, gn.Mesh):
         raise ParameterError("--views photographs a mesh: --shape vase, or a mesh file.")
     cameras = []
@@ -156,9 +155,7 @@ def _captured(
         distance = 1.05 * radius / math.sin(math.radians(_FIELD_OF_VIEW / 2))
         eye = [c + distance * a for c, a in zip(centre, away, strict=True)]
         cameras.append(gn.Pinhole.look_at(eye, centre, _FIELD_OF_VIEW, (size, size)))
-    return gn.simulate_turntable(
-        solid, material, arriving, cameras, sensor, shadows=shadows, misaligned=misaligned, seed=seed
-    )
+    return gn.simulate_turntable(solid, material, arriving, cameras, shadows=shadows, misaligned=misaligned, seed=seed)
 
 
 def _brightest(ideal: Capture | Turntable) -> float:
