@@ -34,7 +34,8 @@ from sphere import times
 import gonio as gn
 from gonio._kernels import radial as kernels
 from gonio.brdf.radial import Interpolant
-from gonio.fitting.centres import Greedy, Lookahead, Spread, choose_centres
+from gonio.fitting.centres import choose_centres
+from gonio.fitting.rules import Greedy, Lookahead, Spread
 
 POINTS = 1 << 18
 PART = 16

@@ -6,6 +6,7 @@ import zipfile
 
 import numpy as np
 import pytest
+from reference.archives import rewritten, with_fields
 
 import gonio as gn
 from gonio.brdf.radial import Interpolant, Radial
@@ -88,19 +89,6 @@ def test_other_materials_are_refused_and_leave_no_file(tmp_path, rng, view, mate
         with pytest.raises(gn.errors.FileError, match=r"a (Lambert|Sum) is not written"):
             write_relightable(path, Relightable(view, given))
     assert not path.exists()
-
-
-def rewritten(path, change):
-    """The file with its entries changed: {name: bytes} -> {name: bytes}."""
-    with zipfile.ZipFile(path) as archive:
-        entries = {name: archive.read(name) for name in archive.namelist()}
-    with zipfile.ZipFile(path, "w") as archive:
-        for name, data in change(entries).items():
-            archive.writestr(name, data)
-
-
-def with_fields(**fields):
-    return lambda entries: entries | {"gonio.json": json.dumps(json.loads(entries["gonio.json"]) | fields)}
 
 
 def without(name):

@@ -1,10 +1,8 @@
 """Facts about .gonio files that hold SHRMs."""
 
-import json
-import zipfile
-
 import numpy as np
 import pytest
+from reference.archives import rewritten, with_fields
 
 import gonio as gn
 from gonio.files.shrm import read_shrm, write_shrm
@@ -14,23 +12,6 @@ from gonio.rendering.shrm import prefilter
 @pytest.fixture(scope="module")
 def maps():
     return prefilter(gn.studio(32), gn.Lambert([0.5, 0.3, 0.2]) + gn.OrenNayar(0.2, 0.5), error=0.1)
-
-
-def rewritten(path, change):
-    """The file with its entries changed: {name: bytes} -> {name: bytes}."""
-    with zipfile.ZipFile(path) as archive:
-        entries = {name: archive.read(name) for name in archive.namelist()}
-    with zipfile.ZipFile(path, "w") as archive:
-        for name, data in change(entries).items():
-            archive.writestr(name, data)
-
-
-def with_fields(**fields):
-    def change(entries):
-        manifest = json.loads(entries["gonio.json"]) | fields
-        return entries | {"gonio.json": json.dumps(manifest)}
-
-    return change
 
 
 def test_what_was_written_is_read(tmp_path, maps):

@@ -3,7 +3,8 @@ import pytest
 
 import gonio as gn
 from gonio.fitting import centres
-from gonio.fitting.centres import Greedy, Lookahead, Spread, choose_centres
+from gonio.fitting.centres import choose_centres
+from gonio.fitting.rules import Greedy, Lookahead, Spread
 
 SCALES = np.array([1, 1, 0.5])
 RULES = [Greedy(5), Lookahead(0.2), Spread(0.2)]

@@ -5,7 +5,8 @@ import pytest
 
 import gonio as gn
 from gonio.fitting import validation
-from gonio.fitting.centres import Lookahead, Spread, choose_centres
+from gonio.fitting.centres import choose_centres
+from gonio.fitting.rules import Lookahead, Spread
 from gonio.fitting.validation import choose_scales
 
 

@@ -32,8 +32,9 @@ from ..directions import uvw
 from ..errors import ArrayError, ParameterError
 from ..reflection import varied
 from ..samples import ReflectanceSamples
-from .centres import Choice, Lookahead, Rule, choose_centres
+from .centres import Choice, choose_centres
 from .model import Fit
+from .rules import Lookahead, Rule
 from .smoothing import smoothed
 from .validation import choose_scales
 

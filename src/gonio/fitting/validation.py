@@ -25,7 +25,8 @@ import numpy as np
 from ..arrays import Array, to_numpy
 from ..brdf.radial import Interpolant
 from ..errors import ArrayError, ParameterError
-from .centres import Choice, Rule, Spread, choose_centres
+from .centres import Choice, choose_centres
+from .rules import Rule, Spread
 
 SCALES = (1 / 64, 1 / 32, 1 / 16, 1 / 8, 1 / 4, 1 / 2, 1.0, 2.0)
 STIFFNESS = (0.0, 0.003, 0.01, 0.03, 0.06, 0.12, 0.25, 0.5, 1.0)

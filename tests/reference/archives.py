@@ -1,0 +1,21 @@
+"""Changes of .gonio files: what is damaged in them is to be refused by name."""
+
+import json
+import zipfile
+
+
+def rewritten(path, change):
+    """The file with its entries changed: {name: bytes} -> {name: bytes}."""
+    with zipfile.ZipFile(path) as archive:
+        entries = {name: archive.read(name) for name in archive.namelist()}
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, data in change(entries).items():
+            archive.writestr(name, data)
+
+
+def with_fields(**fields):
+    def change(entries):
+        manifest = json.loads(entries["gonio.json"]) | fields
+        return entries | {"gonio.json": json.dumps(manifest)}
+
+    return change
