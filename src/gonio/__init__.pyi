@@ -47,7 +47,7 @@ from .errors import GonioError as GonioError
 from .errors import GonioWarning as GonioWarning
 from .files.brdfs import read_brdf as read_brdf
 from .files.camera_poses import read_cameras as read_cameras
-from .files.capture_toml import write_capture as write_capture
+from .files.capture_writing import write_capture as write_capture
 from .files.captures import read_capture as read_capture
 from .files.cornell import read_cornell as read_cornell
 from .files.engine_harmonics import Engine as Engine

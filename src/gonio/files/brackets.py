@@ -37,10 +37,10 @@ class BracketFiles(Photographs):
     encoding: as in `read_image`, what the files state or sRGB where None; or the camera's `Response`. noise: the
     sensor's, `Noise()` where None. vignetting (rows, columns, 1 or 3): what radiance is divided by, as of `flat_field`.
 
-    `names` are the first of each group, `files` all files, group after group; `response` is what the codes mean,
-    `given` that it came so, `assumed` that nothing states it. Raises `FileError` where groups and times do not fit, a
-    file stands twice, is no image, is of floats, which have no known brightest code, or not like the others in size
-    and bits.
+    `groups` are as given, `names` the first of each, `files` all files, group after group; `response` is what the codes
+    mean, `given` that it came so, `assumed` that nothing states it. Raises `FileError` where groups and times do not
+    fit, a file stands twice, is no image, is of floats, which have no known brightest code, or not like the others in
+    size and bits.
     """
 
     def __init__(
@@ -53,6 +53,7 @@ class BracketFiles(Photographs):
         vignetting: Array | None = None,
     ) -> None:
         self.times = tuple(float(t) for t in times)
+        self.groups = tuple(tuple(group) for group in groups)
         names = [name for group in groups for name in group]
         _require_brackets(folder, groups, names, self.times)
         given = encoding if isinstance(encoding, Response) else None
