@@ -7,10 +7,12 @@ import pytest
 from numpy.testing import assert_allclose
 
 import gonio as gn
+from gonio.brdf.combine import Scaled
 from gonio.brdf.radial import Radial
 from gonio.capture.photographs import Held
 from gonio.capture.simulation import from_above
-from gonio.fitting import sharing
+from gonio.fitting import collecting, sharing
+from gonio.fitting.albedo import albedo_of
 from gonio.fitting.centres import choose_centres
 from gonio.fitting.sharing import Scales, share_reflectance
 from gonio.fitting.smoothing import smoothed
@@ -58,6 +60,16 @@ def left(material, blocks):
         for some in ([material.f(b.wi, b.wo) - b.value for b in blocks], [b.value for b in blocks])
     )
     return np.sqrt(np.mean(off**2) / np.mean(value**2))
+
+
+def left_over_sites(material, blocks):
+    """The same, of a material that varies."""
+    off = total = 0.0
+    for b in blocks:
+        here = gn.reflection.varied(material, lambda value, axes, site=b.site: value[site])
+        off += np.sum((b.wi[:, 2:] * (here.f(b.wi, b.wo) - b.value)) ** 2)
+        total += np.sum((b.wi[:, 2:] * b.value) ** 2)
+    return np.sqrt(off / total)
 
 
 def changed(blocks, change):
@@ -133,6 +145,48 @@ def test_colours_of_their_own_are_told_from_what_is_shared():
     assert errors[0] > 10 * errors[1]
 
 
+def test_regions_keep_what_lies_beside_them_out():
+    def halves(x, y):
+        gloss = gn.Microfacet(gn.GGX(0.25), gn.Fresnel(1.5))
+        return gn.Lambert([0.4, 0.3, 0.2]) + Scaled(gloss, np.where(x > 0, 1.0, 0.1)[:, None])
+
+    capture = photographed(dome(8), halves)
+    kept, at = capture.select([0, 1, 2, 3, 4, 6, 7]), places(capture)
+    right = (capture.sites.positions[:, 0] > 0).astype(int)
+    fits = [
+        share_reflectance(kept.reflectance(), at, centres=300, scales=SCALES, regions=regions)
+        for regions in (None, right)
+    ]
+    off = [error(capture, fit.value.material, 5) for fit in fits]
+    # What bends sharply is drawn by many centres or not at all; two smooth halves by few.
+    assert off[1] < 0.03
+    assert off[0] > 2 * off[1]
+    assert fits[1].history[-1][0] == 300
+    assert fits[1].residual == pytest.approx(left_over_sites(fits[1].value.material, kept.reflectance()), rel=1e-6)
+    one_each = share_reflectance(kept.reflectance(), None, centres=200, scales=SCALES, regions=right)
+    # Each half is one material.
+    assert error(capture, one_each.value.material, 5) < 0.01
+
+
+def test_a_colour_is_what_is_left_when_the_highlight_is_known():
+    def tone(x, y):
+        return np.where((np.floor(6 * x) + np.floor(6 * y)) % 2, 0.3, 0.6)[:, None]
+
+    gloss = gn.Lambert(0.3) + 8 * gn.Microfacet(gn.GGX(0.5), gn.Fresnel(1.5))
+    capture = photographed(dome(5), lambda x, y: Scaled(gloss, tone(x, y) * [1.0, 0.7, 0.5]))
+    nowhere = np.zeros(len(capture.sites), int)
+    fit = share_reflectance(capture.reflectance(), regions=nowhere, centres=150, scales=SCALES, texture=True)
+    table = collecting.collected(capture.reflectance(), None, 0)
+    truth = tone(*capture.sites.positions[:, :2].T)
+    spread = []
+    for albedo in (albedo_of(table, len(truth)), fit.value.material.factor):
+        ratio = albedo[:, 0] / truth[:, 0]
+        spread.append(np.std(ratio) / np.mean(ratio))
+    # The gloss is as bright as the rest, and which light shines in it goes by the site.
+    assert spread[0] > 0.1
+    assert spread[1] < spread[0] / 2
+
+
 def test_one_photograph_shows_one_difference_angle_and_leaves_it_out(ball):
     fit = share_reflectance(ball.select([1]).reflectance(), centres=60)
     assert isinstance(fit.value.material, Radial)
@@ -182,8 +236,8 @@ def test_samples_that_are_far_too_bright_do_not_pull_a_smooth_fit(blocks, rng):
 def test_light_at_the_eye_reflects_alike_whatever_phi_d(monkeypatch):
     capture = photographed([*dome(12)[5:7], *gn.distant_lights([[0.0, 0, 1]], [np.pi])])
     spread = []
-    for back in (sharing._BACK, 0.0):
-        monkeypatch.setattr(sharing, "_BACK", back)
+    for back in (collecting._BACK, 0.0):
+        monkeypatch.setattr(collecting, "_BACK", back)
         material = share_reflectance(capture.reflectance(), centres=200, scales=Scales(0.3, 2.0)).value.material
         theta_h = np.linspace(0.1, 0.8, 8)[:, None]
         f = material.f(*gn.from_half_difference(theta_h, 0.0, 1e-4, np.linspace(0, np.pi, 13)))
@@ -195,8 +249,8 @@ def test_light_at_the_eye_reflects_alike_whatever_phi_d(monkeypatch):
 
 def test_more_samples_than_are_looked_at_are_thinned_evenly(blocks, monkeypatch):
     total = sum(len(b) for b in blocks)
-    monkeypatch.setattr(sharing, "_MOST", 3000)
-    table = sharing._collected(blocks, None, 0)
+    monkeypatch.setattr(collecting, "_MOST", 3000)
+    table = collecting.collected(blocks, None, 0)
     share = len(table.site) / total
     assert 1500 < len(table.site) <= 3000
     for k, block in enumerate(blocks):
@@ -260,6 +314,11 @@ def test_what_cannot_be_shared_is_refused_by_name(ball, blocks):
         (blocks, at[:, :1], {}, gn.errors.ArrayError, "places have shape"),
         (blocks, hole, {}, gn.errors.ArrayError, r"places\[7, 0\] is nan"),
         (blocks, None, {"texture": True}, gn.errors.ParameterError, "places are wanted"),
+        (blocks, None, {"regions": np.zeros(9, int)}, gn.errors.ArrayError, "regions are of 9 sites"),
+        (blocks, at, {"regions": np.zeros(9, int)}, gn.errors.ArrayError, r"regions are int64 \(9,\)"),
+        (blocks, at, {"regions": np.zeros(len(at))}, gn.errors.ArrayError, "regions are float64"),
+        (blocks, at, {"regions": -np.arange(len(at)), "scales": SCALES}, gn.errors.ParameterError, "region -"),
+        (blocks, None, {"regions": np.arange(len(at) + 1) // len(at)}, gn.errors.ArrayError, "region 1 has no sample"),
         (blocks, None, {"centres": 3, "scales": SCALES}, gn.errors.ParameterError, "4 centres at least"),
     ):
         with pytest.raises(kind, match=message):

@@ -3,14 +3,13 @@
     f(x, wi, wo) = a(x) exp(s(q)),   q = (x, y, u, |v|, w)       s radial basis functions and a linear polynomial, RS 13
     e = I |log f - log a - s|,   I ~ f cos theta_i               what is brought down: the error of radiance (RS 6)
 
-Homogeneous without (x, y), RS 12; without w where one photograph shows a single theta_d, RS 15. a is 1, or the median
-of each site's samples (RS 14, 8.1), for texture that is finer than sharing could tell.
+Homogeneous without (x, y), RS 12; without w where one photograph shows a single theta_d, RS 15. a is 1, or a colour of
+each site (RS 14), for texture that is finer than sharing could tell (`albedo`). Regions have an s each (RS 8).
 
 RS interpolates f itself, over (u, v). Its logarithm is smoother and stays positive, and |v| adds the symmetry of
 isotropic materials: for the same 600 centres the error of held-out samples falls from .076 to .0044 (`logarithm`,
 `folded`; without both it is the paper's). RS interpolates at the centres; least squares of many samples more is what
-photographs want, with their noise, edges and shadows (`smooth`); samples that are far off count little. At theta_d = 0
-phi_d has no meaning: such samples enter at eight angles, folded at five.
+photographs want, with their noise, edges and shadows (`smooth`); samples that are far off count little.
 
 Not here: the solve (`radial_basis`, `smoothing`), the choice of centres (`centres`), and of scales (`validation`).
 """
@@ -20,33 +19,28 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable, Iterable
-from typing import Any
 
 import numpy as np
 
-from ..arrays import Array, require_finite, to_numpy
-from ..brdf.combine import Scaled
+from ..arrays import Array, to_numpy
+from ..brdf.combine import Scaled, Sum
 from ..brdf.model import BRDF
 from ..brdf.radial import Radial
-from ..directions import uvw
 from ..errors import ArrayError, ParameterError
-from ..reflection import varied
 from ..samples import ReflectanceSamples
+from .albedo import DARKEST, albedo_of, ordinary
 from .centres import Choice, choose_centres
+from .collecting import Table, collected, entered
 from .model import Fit
 from .rules import Lookahead, Rule
 from .smoothing import smoothed
 from .validation import choose_scales
 
-_MOST = 1_100_000  # samples that are looked at: more tell no more
 _SINGLE = 1e-3  # range of w within which a photograph is of one theta_d
-_BACK = 0.01  # theta_d, radians, below which phi_d has no meaning
 _GRAZING = 0.15  # cosine of light below which noise is most of what f is
-_LIT = 0.2  # sum of a site's squared cosines below which its colour may be noise
 _STIFF = 0.03  # where nothing tells how noisy samples are
 _AGAIN = 2  # fits with weights by the one before
 _USUAL = 0.3  # log f that is off by less is no outlier
-_DARKEST = 1e-3  # of the median reflectance that is above 0: below it noise is all there is
 _LEAST_AND_MOST = 0.05, 4.0  # weights, of the median: no highlight is all there is, nor does any dark count for nothing
 
 
@@ -75,10 +69,23 @@ class Shared:
     sites: np.ndarray
 
 
+@dataclasses.dataclass(frozen=True)
+class _How:
+    """What is the same for all regions."""
+
+    logarithm: bool
+    folded: bool
+    smooth: bool
+    rule: Rule
+    error: float
+    seed: int
+
+
 def share_reflectance(
     samples: Iterable[ReflectanceSamples],
     places: Array | None = None,
     *,
+    regions: Array | None = None,
     centres: int = 2000,
     error: float = 0.0,
     scales: Scales | None = None,
@@ -93,144 +100,135 @@ def share_reflectance(
     """The BRDF at S sites from samples of a few photographs, a block of samples each.
 
     places: (S, 2), where each site lies on the surface, best in distances along it; None for one BRDF everywhere.
-    centres: at most; fewer where the residual falls to `error`. scales: found by leaving photographs out where None.
-    texture: give each site its own colour. logarithm, folded, smooth: as above; without all three it is the paper's.
-    rule: how centres are chosen, `Lookahead()` where None. progress(done, total) hears of centres.
+    regions: (S,) whole numbers. Sites of different ones share nothing, so that reflectance may jump between them.
+    centres: at most, divided among regions by their samples; fewer where the residual falls to `error`. scales: found
+    by leaving photographs out where None, in the largest region. texture: give each site its own colour. logarithm,
+    folded, smooth: as above; without all three it is the paper's. rule: how centres are chosen, `Lookahead()` where
+    None. progress(done, total) hears of centres. The fit's history counts centres from one region to the next.
 
-    Raises `ArrayError` where there are too few samples, none is positive, or places do not fit the sites.
+    Raises `ArrayError` where there are too few samples, of a region too, none is positive, or places or regions do not
+    fit the sites.
     """
-    table = _collected(samples, places, seed)
-    albedo = _albedo(table, places) if texture else None
-    values = table.value if albedo is None else table.value / albedo[table.site]
-    q, at = _entered(table, folded)
+    table = collected(samples, places, seed)
+    labels = _labels(table, places, regions)
+    if texture and labels is None:
+        raise ParameterError(
+            "texture gives each site its own colour: places are wanted, to tell the sites apart, or regions."
+        )
+    albedo = albedo_of(table, len(labels)) if texture and labels is not None else None
+    of = np.zeros(len(table), np.intp) if labels is None else labels[table.site]
+    names, sizes = np.unique(of, return_counts=True)
+    if labels is not None and len(alone := np.setdiff1d(labels, names)):
+        raise ArrayError(f"region {alone[0]} has no sample. Give its sites to another, or take them out of the mask.")
+    how = _How(logarithm, folded, smooth, rule or Lookahead(), error, seed)
+    regional: dict[int, Radial] = {}
+    history: list[tuple[int, float]] = []
+    ends, squares = [], 0.0
+    for k in np.argsort(-sizes, kind="stable"):
+        own, before = table[of == names[k]], history[-1][0] if history else 0
+        most = round(centres * sizes[k] / len(table))
+
+        def hear(done: int, _: int, before: int = before) -> None:
+            if progress is not None:
+                progress(before + done, centres)
+
+        try:
+            model, found, scales = _shared(own, albedo, most, scales, how, hear)
+        except (ArrayError, ParameterError) as bad:
+            raise type(bad)(f"region {names[k]}: {bad}" if names.size > 1 else str(bad)) from bad
+        d = model.f(own.wi, own.wo)
+        if albedo is not None:
+            some = np.unique(own.site)
+            albedo[some] = albedo_of(own, len(albedo), d)[some]
+            d = d * albedo[own.site]
+        squares += float(np.sum((own.wi[:, 2:] * (d - own.value)) ** 2))
+        history += [(before + count, left) for count, left in found.history]
+        ends.append((found.converged, found.reason))
+        regional[int(names[k])] = model
+    assert scales is not None
+    seen = np.zeros(1 if labels is None else len(labels), bool)
+    seen[0 if labels is None else table.site] = True
+    residual = math.sqrt(squares / float(np.sum((table.wi[:, 2:] * table.value) ** 2)))
+    converged, reason = min(ends, key=lambda end: end[0])  # the first that did not converge tells why
+    material = _over_sites(regional, labels, albedo, places)
+    return Fit(Shared(material, scales, seen), residual, converged, reason, tuple(history))
+
+
+def _labels(table: Table, places: Array | None, regions: Array | None) -> np.ndarray | None:
+    """The region of each site (S,); None where sites are not told apart."""
+    if regions is None:
+        return None if places is None else np.zeros(len(to_numpy(places)), np.intp)
+    labels = np.asarray(to_numpy(regions))
+    wanted = table.site.max() + 1 if places is None else len(to_numpy(places))
+    if labels.ndim != 1 or labels.dtype.kind not in "iu" or not (len(labels) == wanted or places is None):
+        raise ArrayError(f"regions are {labels.dtype} {labels.shape}; a whole number for each of {wanted} sites.")
+    if len(labels) < wanted:
+        raise ArrayError(f"regions are of {len(labels)} sites; samples are of {wanted} or more.")
+    return labels.astype(np.intp)
+
+
+def _shared(
+    table: Table,
+    albedo: np.ndarray | None,
+    most: int,
+    scales: Scales | None,
+    how: _How,
+    progress: Callable[[int, int], None],
+) -> tuple[Radial, Choice, Scales]:
+    """d of one region, at the places of its samples; the choice of its centres; and scales, found where None."""
+    q, at = entered(table, how.folded)
     flat = float(np.ptp(q[:, -1])) < _SINGLE
     if flat:
         q = q[:, :-1]
-    target, cosine = values[at], table.wi[at, 2]
-    light = cosine
-    weights = light
-    if logarithm:
-        target = np.log(np.maximum(target, _DARKEST * _ordinary(target)))
-        light = light if albedo is None else light * albedo[table.site[at]].mean(axis=1)
-        weights = _bright(light * np.exp(target).mean(axis=1))
-    spatial = places is not None
-    chosen = scales
-    if chosen is None:
-        chosen = _validated(q, target, weights, table.group[at], spatial, flat, seed)
-    diagonal = _diagonal(chosen, spatial, flat)
-    found: Choice = choose_centres(
-        q, target, weights, diagonal, chosen.stiffness, rule or Lookahead(), centres, error, progress
+    cosine = table.wi[at, 2]
+    target, light = _target(table, at, albedo, how.logarithm)
+    weights = _bright(light * np.exp(target).mean(axis=1)) if how.logarithm else cosine
+    spatial = table.place is not None
+    if scales is None:
+        scales = _validated(q, target, weights, table.group[at], spatial, flat, how.seed)
+    found = choose_centres(
+        q, target, weights, _diagonal(scales, spatial, flat), scales.stiffness, how.rule, most, how.error, progress
     )
     interpolant = found.interpolant
-    if smooth:
-        interpolant = smoothed(interpolant, q, target, weights, chosen.stiffness, seed)
-        for _ in range(_AGAIN if logarithm else 0):
-            trusted = _trusted(interpolant(q), target, light)
-            interpolant = smoothed(interpolant, q, target, trusted, chosen.stiffness, seed)
+    if how.smooth:
+        interpolant = smoothed(interpolant, q, target, weights, scales.stiffness, how.seed)
+        for _ in range(_AGAIN if how.logarithm else 0):
+            fitted = interpolant(q)
+            if albedo is not None:
+                albedo = albedo_of(table, len(albedo), np.exp(fitted[: len(table)]))
+                target, light = _target(table, at, albedo, how.logarithm)
+            interpolant = smoothed(interpolant, q, target, _trusted(fitted, target, light), scales.stiffness, how.seed)
     # What grazing light makes of noise is no reflectance to end at.
     steep = cosine > _GRAZING
     some = target[steep] if steep.any() else target
     interpolant = dataclasses.replace(interpolant, limits=np.stack((some.min(axis=0), some.max(axis=0))))
-    x, y = (None, None) if places is None else to_numpy(places).astype(np.float64).T
-    material: BRDF = Radial(interpolant, logarithm=logarithm, folded=folded, flat=flat, x=x, y=y)
+    x, y = (None, None) if table.place is None else table.place.T
+    return Radial(interpolant, logarithm=how.logarithm, folded=how.folded, flat=flat, x=x, y=y), found, scales
+
+
+def _target(
+    table: Table, at: np.ndarray, albedo: np.ndarray | None, logarithm: bool
+) -> tuple[np.ndarray, np.ndarray]:
+    """What s is to be at samples `at` of the table (M, C), and the light by which what it misses is seen (M,)."""
+    value, light = table.value[at], table.wi[at, 2]
     if albedo is not None:
-        material = Scaled(material, albedo)
-    count = 1 if places is None else len(to_numpy(places))
-    seen = np.zeros(count, bool)
-    seen[table.site if spatial else 0] = True
-    residual = _left(material, table, places)
-    return Fit(Shared(material, chosen, seen), residual, found.converged, found.reason, found.history)
+        colour = albedo[table.site[at]]
+        value, light = value / colour, light * colour.mean(axis=1)
+    return np.log(np.maximum(value, DARKEST * ordinary(value))) if logarithm else value, light
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class _Table:
-    """M samples: wi, wo, value (M, 3) or (M, C); site, group (M,), the photograph; place (M, 2) or None."""
-
-    wi: np.ndarray
-    wo: np.ndarray
-    value: np.ndarray
-    site: np.ndarray
-    group: np.ndarray
-    place: np.ndarray | None
-
-
-def _collected(samples: Iterable[ReflectanceSamples], places: Array | None, seed: int) -> _Table:
-    """All samples, or evenly chosen ones of them where they are more than `_MOST`; those that are negative as 0."""
-    rng, kept, share, total = np.random.default_rng(seed), [], 1.0, 0
-    for number, block in enumerate(samples):
-        draw = rng.random(len(block))
-        some = draw < share
-        kept.append((draw[some], block.wi[some], block.wo[some], block.value[some], block.site[some], number))
-        total += int(np.count_nonzero(some))
-        while total > _MOST:
-            share /= 2
-            kept = [_thinned(part, share) for part in kept]
-            total = sum(len(part[0]) for part in kept)
-    if not total:
-        raise ArrayError("there are no samples. Do the lights belong to these photographs, and do they face the shape?")
-    wi, wo, value, site = (np.concatenate([part[k] for part in kept]) for k in range(1, 5))
-    group = np.concatenate([np.full(len(part[0]), part[5]) for part in kept])
-    if not (value > 0).any():
-        raise ArrayError("no sample is above 0: the photographs are black where lights reach the shape.")
-    place = None
+def _over_sites(
+    regional: dict[int, Radial], labels: np.ndarray | None, albedo: np.ndarray | None, places: Array | None
+) -> BRDF:
+    """The models of regions at all sites: one, times its colours; or their sum, each 0 outside its own."""
     if places is not None:
-        at = to_numpy(places).astype(np.float64)
-        if at.ndim != 2 or at.shape[1] != 2 or len(at) <= site.max():
-            raise ArrayError(f"places have shape {at.shape}; ({site.max() + 1} or more sites, 2) is wanted.")
-        require_finite(at, "places")
-        place = at[site]
-    return _Table(wi, wo, np.maximum(value, 0), site, group, place)
-
-
-def _thinned(part: tuple[Any, ...], share: float) -> tuple[Any, ...]:
-    """Of a block's arrays, where the first, drawn for each sample, lies below `share`; its number."""
-    keep = part[0] < share
-    return (*(x[keep] for x in part[:5]), part[5])
-
-
-def _albedo(table: _Table, places: Array | None) -> np.ndarray:
-    """The median of each site's samples (S, 3), weighted by their cosine, squared: radiance is as noisy at all. Of all
-    where a site has none, at most of all where light grazes it alone; where it is black, near it."""
-    if places is None:
-        raise ParameterError("texture gives each site its own colour: places are wanted, to tell the sites apart.")
-    overall = _ordinary(table.value)
-    albedo = np.tile(overall, (len(to_numpy(places)), 1))
-    for c in range(albedo.shape[1]):
-        order = np.lexsort((table.value[:, c], table.site))
-        site, first, count = np.unique(table.site[order], return_index=True, return_counts=True)
-        total = np.concatenate(([0.0], np.cumsum(table.wi[order, 2] ** 2)))
-        half = (total[first] + total[first + count]) / 2
-        at = np.clip(np.searchsorted(total, half) - 1, first, first + count - 1)
-        lit = total[first + count] - total[first] > _LIT
-        found = np.maximum(table.value[order[at], c], _DARKEST * overall[c])
-        albedo[site, c] = np.where(lit, found, np.minimum(found, overall[c]))
-    return albedo
-
-
-def _ordinary(value: np.ndarray) -> np.ndarray:
-    """The median of what is above 0 in each channel (C,) of values (M, C), some of which are; in all where none is."""
-    every = np.median(value[value > 0])
-    return np.array([np.median(channel[channel > 0]) if (channel > 0).any() else every for channel in value.T])
-
-
-def _entered(table: _Table, folded: bool) -> tuple[np.ndarray, np.ndarray]:
-    """q (M, d), and the sample that each is of (M,): those at theta_d = 0 come at all angles."""
-    angles = uvw(table.wi, table.wo)
-    back = np.flatnonzero(angles[:, 2] < _BACK * 2 / math.pi)
-    s, w = np.hypot(angles[back, 0], angles[back, 1]), angles[back, 2]
-    angles[back] = np.stack((s, 0 * s, w), axis=-1)
-    parts, at = [angles], [np.arange(len(angles))]
-    # By eighths of a circle; folded, half of it is all there is.
-    for turn in range(1, 5 if folded else 8):
-        phi = turn * math.pi / 4
-        parts.append(np.stack((s * math.cos(phi), s * math.sin(phi), w), axis=-1))
-        at.append(back)
-    q, sample = np.concatenate(parts), np.concatenate(at)
-    if folded:
-        q[:, 1] = np.abs(q[:, 1])
-    if table.place is not None:
-        q = np.concatenate((table.place[sample], q), axis=1)
-    return q, sample
+        x, y = to_numpy(places).astype(np.float64).T
+        regional = {name: dataclasses.replace(model, x=x, y=y) for name, model in regional.items()}
+    if len(regional) == 1:
+        (model,) = regional.values()
+        return model if albedo is None else Scaled(model, albedo)
+    colour = 1.0 if albedo is None else albedo
+    return Sum(tuple(Scaled(model, colour * (labels == name)[:, None]) for name, model in regional.items()))
 
 
 def _bright(radiance: np.ndarray) -> np.ndarray:
@@ -263,10 +261,3 @@ def _validated(
         return Scales(stiffness=_STIFF)
     space = found.scales[0] if spatial else Scales.space
     return Scales(float(space), Scales.difference if flat else float(found.scales[-1]), found.rho)
-
-
-def _left(material: BRDF, table: _Table, places: Array | None) -> float:
-    """rms of what is left of radiance over the rms of radiance."""
-    here = material if places is None else varied(material, lambda value, axes: value[table.site])
-    light, f = table.wi[:, 2:], here.f(table.wi, table.wo)
-    return float(np.sqrt(np.mean((light * (f - table.value)) ** 2) / np.mean((light * table.value) ** 2)))
