@@ -90,6 +90,7 @@ def share_reflectance(
     error: float = 0.0,
     scales: Scales | None = None,
     texture: bool = False,
+    gray: bool = False,
     logarithm: bool = True,
     folded: bool = True,
     smooth: bool = True,
@@ -102,14 +103,16 @@ def share_reflectance(
     places: (S, 2), where each site lies on the surface, best in distances along it; None for one BRDF everywhere.
     regions: (S,) whole numbers. Sites of different ones share nothing, so that reflectance may jump between them.
     centres: at most, divided among regions by their samples; fewer where the residual falls to `error`. scales: found
-    by leaving photographs out where None, in the largest region. texture: give each site its own colour. logarithm,
-    folded, smooth: as above; without all three it is the paper's. rule: how centres are chosen, `Lookahead()` where
-    None. progress(done, total) hears of centres. The fit's history counts centres from one region to the next.
+    by leaving photographs out where None, in the largest region. texture: give each site its own colour. gray: fit
+    the mean of the channels. logarithm, folded, smooth: as above; without all three it is the paper's. rule: how
+    centres are chosen, `Lookahead()` where None. progress(done, total) hears of centres. The fit's history counts centres from one region to the next.
 
     Raises `ArrayError` where there are too few samples, of a region too, none is positive, or places or regions do not
     fit the sites.
     """
     table = collected(samples, places, seed)
+    if gray:
+        table = dataclasses.replace(table, value=table.value.mean(axis=1, keepdims=True))
     labels = _labels(table, places, regions)
     if texture and labels is None:
         raise ParameterError(
