@@ -29,6 +29,9 @@ from .capture.integration import integrate_normals as integrate_normals
 from .capture.lighting import distant_lights as distant_lights
 from .capture.lighting import near_lights as near_lights
 from .capture.model import Capture as Capture
+from .capture.parts import parts_by_colour as parts_by_colour
+from .capture.parts import parts_by_least_light as parts_by_least_light
+from .capture.parts import parts_by_polarisers as parts_by_polarisers
 from .capture.photometric_stereo import photometric_stereo as photometric_stereo
 from .capture.simulation import Sensor as Sensor
 from .capture.simulation import simulate as simulate
@@ -80,6 +83,7 @@ from .files.rgl import read_rgl as read_rgl
 from .files.shrm import read_shrm as read_shrm
 from .files.shrm import write_shrm as write_shrm
 from .files.transforms import write_transforms as write_transforms
+from .fitting.dichromatic import share_dichromatic as share_dichromatic
 from .fitting.model import Fit as Fit
 from .fitting.sharing import Scales as Scales
 from .fitting.sharing import share_reflectance as share_reflectance

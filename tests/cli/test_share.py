@@ -67,6 +67,59 @@ def test_photographs_left_out_are_predicted(capsys, tmp_path, folder, how, most)
     assert off == pytest.approx(errors[0], rel=0.01)
 
 
+def test_body_and_surface_are_fitted_apart(capsys, tmp_path, folder):
+    output, arguments = tmp_path / "thing.gonio", ("--leave", "4", "--centres", 60, "--specular-centres", 150, "--json")
+    for how in ("colour", "least"):
+        code, out, err = run(
+            capsys, "share", folder, "-o", output, "--separate", how, "--scales", ".2,.5,.01", *arguments
+        )
+        assert code == 0, err
+        facts = json.loads(out)
+        assert (facts["centres of the body"], facts["centres of the surface"]) == (60, 150)
+        # Nine lights leave no pixel's gloss dark, and the parts are told poorly; their sum is not.
+        assert facts["error of photo4.png"] < 0.03
+    assert len(gn.read_relightable(output).material.terms) == 2
+
+
+def test_photographs_through_polarisers_are_predicted_as_without(capsys, tmp_path, folder):
+    for name, sign in (("parallel", 1), ("crossed", -1)):
+        shutil.copytree(folder, tmp_path / name)
+        for path in (tmp_path / name).glob("photo*.png"):
+            image = gn.read_image(path, "linear")
+            surface = 0.4 * image.min(axis=2, keepdims=True)  # grey
+            gn.write_image(path, (image + sign * surface) / 2, bits=16, encoding="linear")
+    picture = tmp_path / "p.png"
+    code, out, err = run(
+        *(capsys, "share", tmp_path / "parallel", "--crossed", tmp_path / "crossed", "-o", tmp_path / "thing.gonio"),
+        *("--leave", "4", "--centres", 100, "--specular-centres", 100, "--scales", ".2,.5", "--picture", picture),
+        "--json",
+    )
+    assert code == 0, err
+    assert json.loads(out)["error of photo4.png"] < 0.03
+    assert gn.image_info(picture).columns > 600
+
+
+def test_regions_are_the_colours_of_an_image(capsys, tmp_path, folder):
+    labels = np.zeros((32, 32, 3))
+    labels[:, 16:] = [0.5, 0, 0]
+    gn.write_image(tmp_path / "labels.png", labels)
+    output = tmp_path / "thing.gonio"
+    arguments = ("-o", output, "--leave", "4", "--centres", 200, "--scales", "1,.5", "--homogeneous", "--json")
+    code, out, err = run(capsys, "share", folder, "--regions", tmp_path / "labels.png", *arguments)
+    assert code == 0, err
+    assert json.loads(out)["error of photo4.png"] < 0.01
+    assert len(gn.read_relightable(output).material.terms) == 2
+    gn.write_image(tmp_path / "noise.png", np.random.default_rng(0).random((32, 32, 3)))
+    gn.write_image(tmp_path / "small.png", labels[:8])
+    for name, message in (
+        ("noise.png", "64 regions at most"),
+        ("small.png", "(8, 32) pixels, the photographs (32, 32)"),
+    ):
+        code, _, err = run(capsys, "share", folder, "--regions", tmp_path / name, *arguments)
+        assert code == 2
+        assert message in err
+
+
 def test_people_read_a_table_and_the_file(capsys, tmp_path, folder):
     output = tmp_path / "thing.gonio"
     code, out, _ = run(capsys, "share", folder, "-o", output, "--homogeneous", "--centres", 40, "--scales", "1,.5")
@@ -125,7 +178,10 @@ def test_a_capture_without_normals_goes_through_photometric_stereo(capsys, tmp_p
         (("--scales", "1,0"), "positive"),
         (("--scales", "1,x"), "'1,x' is not numbers"),
         (("--least", "2"), "least = 2"),
-        (("--texture", "--homogeneous"), "places are wanted"),
+        (("--separate", "size"), "colour or least is wanted"),
+        (("--separate", "colour", "--homogeneous"), "leave --separate and --crossed out"),
+        (("--separate", "colour", "--crossed", "x"), "give one of them"),
+        (("--crossed", "none"), "none"),
         (("--centres", "4"), "centres"),
         (("--picture", "seen.jpg"), "end its name in .png"),
         (("--output", "thing.exr"), "end its name in .gonio"),

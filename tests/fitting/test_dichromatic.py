@@ -88,13 +88,13 @@ def test_polarisers_give_the_parts_back(parts):
         np.testing.assert_array_equal(
             found.photographs.pixels(at).radiance[3], found.photographs.read(3).radiance.reshape(-1, 3)[at]
         )
-    with pytest.raises(gn.errors.ArrayError, match="10 photographs .* the crossed one 9"):
+    with pytest.raises(gn.errors.ArrayError, match=r"10 photographs .* the crossed one 9"):
         parts_by_polarisers(parallel, crossed.select(range(9)))
 
 
 @pytest.mark.parametrize("separate", [parts_by_colour, parts_by_least_light])
 def test_parts_add_up_and_are_near_the_truth(parts, separate):
-    matte, shiny, both = parts
+    _, shiny, both = parts
     strong = dataclasses.replace(
         both, lights=gn.distant_lights(both.directions, np.full((10, 3), np.pi) * [1.2, 1.0, 0.8])
     )

@@ -182,9 +182,9 @@ def test_a_colour_is_what_is_left_when_the_highlight_is_known():
     for albedo in (albedo_of(table, len(truth)), fit.value.material.factor):
         ratio = albedo[:, 0] / truth[:, 0]
         spread.append(np.std(ratio) / np.mean(ratio))
-    # The gloss is as bright as the rest, and which light shines in it goes by the site.
+    # Which light shines in the gloss goes by the site; what is shared was fitted with colours that did not know it.
     assert spread[0] > 0.1
-    assert spread[1] < spread[0] / 2
+    assert spread[1] < 0.7 * spread[0]
 
 
 def test_one_photograph_shows_one_difference_angle_and_leaves_it_out(ball):

@@ -16,8 +16,11 @@ if TYPE_CHECKING:
     import numpy as np
 
     from ..capture.model import Capture
+    from ..capture.parts import Parts
     from ..fitting.sharing import Scales
     from ..rendering.relight import Relightable
+
+_MOST_REGIONS = 64
 
 
 def share(
@@ -30,6 +33,16 @@ def share(
     leave: str = typer.Option("", "--leave", help="Photographs to leave out and predict: 0,5,9."),
     homogeneous: bool = typer.Option(False, "--homogeneous", help="One BRDF everywhere."),
     texture: bool = typer.Option(False, "--texture", help="A colour for each pixel, times what is shared."),
+    regions: Path | None = typer.Option(
+        None, "--regions", help="An image with a colour for each region: they share nothing with each other."
+    ),
+    separate: str = typer.Option(
+        "", "--separate", help="Fit body and surface apart, told by colour or by least (light) of the photographs."
+    ),
+    crossed: Path | None = typer.Option(
+        None, "--crossed", help="The same through a crossed polariser, in a folder: fit body and surface apart."
+    ),
+    specular_centres: int = typer.Option(5000, "--specular-centres", min=8, help="For the surface, where it is apart."),
     scales: str = typer.Option("", "--scales", help="m_xy,m_w[,rho]; else found by leaving photographs out."),
     paper: bool = typer.Option(
         False, "--paper", help="As the paper: interpolate f itself over v, not fit log f over |v|."
@@ -44,47 +57,76 @@ def share(
     """Share reflectance between the pixels of a few photographs: radial functions of place and angle."""
     import numpy as np
 
+    import gonio as gn
     from gonio.files.relightable import write_relightable
     from gonio.files.whole import writable
-    from gonio.fitting.sharing import share_reflectance
     from gonio.rendering.relight import Relightable
 
     for path, suffix in ((output, ".gonio"), (picture, ".png")):
         if path:
             writable(path, suffix)
+    _require_one(separate, crossed, homogeneous)
     given = _scales(scales)
     scene = captures.read(capture, encoding, partial, lights)
     left = _left_out(leave, len(scene.photographs))
     kept = [k for k in range(len(scene.photographs)) if k not in left]
+    behind = captures.read(crossed, encoding, partial, lights) if crossed else None
     if scene.normals is None:
         typer.echo(f"{capture}: its shape is unknown; normals by photometric stereo", err=True)
-        scene = _shaped(scene, kept)
-    used = scene.select(kept)
-    places = None if homogeneous else _places(scene)
-    with bar("centres") as progress:
-        fit = share_reflectance(
-            used.reflectance(least),
-            places,
-            centres=centres,
-            error=error,
-            scales=given,
-            texture=texture,
-            logarithm=not paper,
-            folded=not paper,
-            smooth=not paper,
-            progress=progress,
-        )
-    thing = Relightable(scene.view, scene.textures(fit.value.material))
-    made = f"gonio share {capture.name}: {len(kept)} photographs, {fit.reason}"
-    write_relightable(output, thing, made)
-    facts: dict[str, Any] = {
-        "photographs": len(kept),
-        "centres": fit.history[-1][0] if fit.history else 0,
-        "residual": fit.residual,
-        "m_xy, m_w, rho": list(dataclasses.astuple(fit.value.scales)),
-        "ended": fit.reason,
+        matte = scene if behind is None else gn.parts_by_polarisers(scene, behind).diffuse
+        shaped = _shaped(matte, kept)
+        scene = dataclasses.replace(scene, normals=shaped.normals, mask=shaped.mask)
+    options: dict[str, Any] = {
+        "regions": _regions(regions, scene.mask) if regions else None,
+        "logarithm": not paper,
+        "folded": not paper,
+        "smooth": not paper,
     }
-    predictions = [_predicted(scene, thing, k) for k in left]
+    places = None if homogeneous else _places(scene)
+    parts = _parts(scene, behind, separate, kept)
+    with bar("centres") as progress:
+        if parts is None:
+            if homogeneous and texture and options["regions"] is None:
+                options["regions"] = np.zeros(np.count_nonzero(scene.mask), int)
+            found = gn.share_reflectance(
+                scene.select(kept).reflectance(least),
+                places,
+                centres=centres,
+                error=error,
+                scales=given,
+                texture=texture,
+                progress=progress,
+                **options,
+            )
+            material, fits = found.value.material, {"": found}
+        else:
+            assert places is not None
+            d, g = (part.reflectance(least) for part in parts)
+            both = gn.share_dichromatic(
+                d,
+                g,
+                places,
+                centres=centres,
+                specular_centres=specular_centres,
+                scales=(given, given),
+                progress=progress,
+                **options,
+            )
+            material, fits = both.material, {" of the body": both.diffuse, " of the surface": both.specular}
+    thing = Relightable(scene.view, scene.textures(material))
+    ended = "; ".join(fit.reason for fit in fits.values())
+    write_relightable(output, thing, f"gonio share {capture.name}: {len(kept)} photographs, {ended}")
+    facts: dict[str, Any] = {"photographs": len(kept)}
+    for name, fit in fits.items():
+        facts[f"centres{name}"] = fit.history[-1][0] if fit.history else 0
+        facts[f"residual{name}"] = fit.residual
+        facts[f"m_xy, m_w, rho{name}"] = list(dataclasses.astuple(fit.value.scales))
+        facts[f"ended{name}"] = fit.reason
+
+    def predicted(k: int) -> tuple[np.ndarray, np.ndarray, float]:
+        return _predicted(scene, behind, thing, k)
+
+    predictions = [predicted(k) for k in left]
     for k, (_, _, off) in zip(left, predictions, strict=True):
         facts[f"error of {scene.photographs.names[k]}"] = off
     if predictions:
@@ -92,9 +134,9 @@ def share(
     if picture:
         from gonio.viewer.sharing import sharing_picture
 
-        shown = predictions or [_predicted(scene, thing, k) for k in kept[:3]]
+        shown = predictions or [predicted(k) for k in kept[:3]]
         names = [scene.photographs.names[k] for k in (left or kept[:3])]
-        sharing_picture(picture, names, shown, fit.history)
+        sharing_picture(picture, names, shown, next(iter(fits.values())).history)
     if as_json:
         typer.echo(json.dumps(facts))
     else:
@@ -102,8 +144,52 @@ def share(
             worded = " ".join(f"{x:.3g}" for x in value) if isinstance(value, list) else value
             typer.echo(f"{name:>28}  {worded:.4g}" if isinstance(worded, float) else f"{name:>28}  {worded}")
         typer.echo(str(output))
-    if error and not fit.converged:
+    if error and not all(fit.converged for fit in fits.values()):
         raise typer.Exit(1)
+
+
+def _require_one(separate: str, crossed: Path | None, homogeneous: bool) -> None:
+    """Refuse ways to tell body and surface apart that do not go together."""
+    from gonio.errors import ParameterError
+
+    if separate not in ("", "colour", "least"):
+        raise ParameterError(f"--separate {separate}: colour or least is wanted.")
+    if separate and crossed:
+        raise ParameterError("--separate and --crossed both tell body and surface apart; give one of them.")
+    if homogeneous and (separate or crossed):
+        raise ParameterError("--homogeneous is one BRDF for body and surface: leave --separate and --crossed out.")
+
+
+def _parts(scene: Capture, behind: Capture | None, separate: str, kept: list[int]) -> Parts | None:
+    """Body and surface of the photographs that are kept; None where they are not to be told apart."""
+    import gonio as gn
+
+    if behind is not None:
+        return gn.parts_by_polarisers(scene.select(kept), behind.select(kept))
+    if not separate:
+        return None
+    with bar("separate") as progress:
+        by = {"colour": gn.parts_by_colour, "least": gn.parts_by_least_light}[separate]
+        return by(scene.select(kept), progress)
+
+
+def _regions(path: Path, mask: np.ndarray) -> np.ndarray:
+    """The region of each pixel of the mask, (sites,): pixels of the same colour are of one."""
+    import numpy as np
+
+    from gonio.errors import FileError
+    from gonio.files.images import read_raster
+
+    image = read_raster(path).samples
+    if image.shape[:2] != mask.shape:
+        raise FileError(f"{path} has {image.shape[:2]} pixels, the photographs {mask.shape}.")
+    _, label = np.unique(image[mask].reshape(np.count_nonzero(mask), -1), axis=0, return_inverse=True)
+    if label.max() >= _MOST_REGIONS:
+        raise FileError(
+            f"{path} has {label.max() + 1} colours on the object, {_MOST_REGIONS} regions at most are fitted. "
+            "Is it smoothed at its edges, or a JPEG?"
+        )
+    return np.asarray(label).reshape(-1)
 
 
 def _left_out(text: str, count: int) -> list[int]:
@@ -155,7 +241,9 @@ def _scales(text: str) -> Scales | None:
     return Scales(*values)
 
 
-def _predicted(scene: Capture, thing: Relightable, k: int) -> tuple[np.ndarray, np.ndarray, float]:
+def _predicted(
+    scene: Capture, behind: Capture | None, thing: Relightable, k: int
+) -> tuple[np.ndarray, np.ndarray, float]:
     """The photograph, what the model makes of its light, and their relative rms where it is not clipped."""
     import numpy as np
 
@@ -163,6 +251,9 @@ def _predicted(scene: Capture, thing: Relightable, k: int) -> tuple[np.ndarray, 
 
     assert scene.lights is not None
     photograph, clipped = scene.photographs.read(k)
+    if behind is not None:  # as no polariser would have it
+        crossed = behind.photographs.read(k)
+        photograph, clipped = photograph + crossed.radiance, clipped | crossed.clipped
     image = gn.relight(thing, scene.lights[k])
     some = scene.mask & ~clipped
     total = np.mean(photograph[some].astype(float) ** 2)

@@ -1,10 +1,10 @@
 """The colour of each site, given what all share (RS 14, 8.1).
 
-    a(x) = median over the samples of x of f, weighted by cos^2 theta_i              before anything is shared, RS 8.1
-    a(x) = argmin sum |f - a d(q)| cos theta_i: f / d, weighted by d cos theta_i     after it
+    a(x) = median over the samples of x of f, weighted by cos^2 theta_i             before anything is shared, RS 8.1
+    a(x) = argmin over a of sum |f - a d(q)| cos theta_i                            after it
 
-A median, since highlights and shadows are outliers to it. The second, beyond RS, knows which of a site's lights shine
-in its highlight.
+The second, beyond RS, is the median of f / d weighted by d cos theta_i: it knows which of a site's lights shine in its
+highlight. Medians, since shadows and what d misses of highlights are outliers.
 """
 
 from __future__ import annotations
@@ -22,17 +22,16 @@ def albedo_of(table: Table, count: int, shared: np.ndarray | None = None) -> np.
 
     A site without samples has the median of all, one that light only grazes at most that; a black one is near black.
     """
-    cosine = table.wi[:, 2]
     value = table.value if shared is None else table.value / np.maximum(shared, DARKEST * ordinary(shared))
+    weights = table.wi[:, 2:] * (np.broadcast_to(table.wi[:, 2:], value.shape) if shared is None else shared)
     overall = ordinary(value)
     albedo = np.tile(overall, (count, 1))
     for c in range(albedo.shape[1]):
         order = np.lexsort((value[:, c], table.site))
         site, first, number = np.unique(table.site[order], return_index=True, return_counts=True)
         last = first + number
-        total = _summed((cosine if shared is None else shared[:, c])[order] * cosine[order])
+        total, light = _summed(weights[order, c]), _summed(table.wi[order, 2] ** 2)
         at = np.clip(np.searchsorted(total, (total[first] + total[last]) / 2) - 1, first, last - 1)
-        light = _summed(cosine[order] ** 2)
         found = np.maximum(value[order[at], c], DARKEST * overall[c])
         albedo[site, c] = np.where(light[last] - light[first] > _LIT, found, np.minimum(found, overall[c]))
     return albedo

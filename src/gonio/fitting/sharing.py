@@ -103,9 +103,10 @@ def share_reflectance(
     places: (S, 2), where each site lies on the surface, best in distances along it; None for one BRDF everywhere.
     regions: (S,) whole numbers. Sites of different ones share nothing, so that reflectance may jump between them.
     centres: at most, divided among regions by their samples; fewer where the residual falls to `error`. scales: found
-    by leaving photographs out where None, in the largest region. texture: give each site its own colour. gray: fit
-    the mean of the channels. logarithm, folded, smooth: as above; without all three it is the paper's. rule: how
-    centres are chosen, `Lookahead()` where None. progress(done, total) hears of centres. The fit's history counts centres from one region to the next.
+    by leaving photographs out where None, in the largest region. texture: give each site its own colour. gray: fit the
+    mean of the channels. logarithm, folded, smooth: as above; without all three it is the paper's. rule: how centres
+    are chosen, `Lookahead()` where None. progress(done, total) hears of centres. The fit's history counts centres from
+    one region to the next.
 
     Raises `ArrayError` where there are too few samples, of a region too, none is positive, or places or regions do not
     fit the sites.
@@ -183,9 +184,14 @@ def _shared(
     flat = float(np.ptp(q[:, -1])) < _SINGLE
     if flat:
         q = q[:, :-1]
-    cosine = table.wi[at, 2]
-    target, light = _target(table, at, albedo, how.logarithm)
-    weights = _bright(light * np.exp(target).mean(axis=1)) if how.logarithm else cosine
+    target, cosine = table.value[at], table.wi[at, 2]
+    weights = light = cosine
+    if albedo is not None:
+        colour = albedo[table.site[at]]
+        target, light = target / colour, light * colour.mean(axis=1)
+    if how.logarithm:
+        target = np.log(np.maximum(target, DARKEST * ordinary(target)))
+        weights = _bright(light * np.exp(target).mean(axis=1))
     spatial = table.place is not None
     if scales is None:
         scales = _validated(q, target, weights, table.group[at], spatial, flat, how.seed)
@@ -196,28 +202,14 @@ def _shared(
     if how.smooth:
         interpolant = smoothed(interpolant, q, target, weights, scales.stiffness, how.seed)
         for _ in range(_AGAIN if how.logarithm else 0):
-            fitted = interpolant(q)
-            if albedo is not None:
-                albedo = albedo_of(table, len(albedo), np.exp(fitted[: len(table)]))
-                target, light = _target(table, at, albedo, how.logarithm)
-            interpolant = smoothed(interpolant, q, target, _trusted(fitted, target, light), scales.stiffness, how.seed)
+            trusted = _trusted(interpolant(q), target, light)
+            interpolant = smoothed(interpolant, q, target, trusted, scales.stiffness, how.seed)
     # What grazing light makes of noise is no reflectance to end at.
     steep = cosine > _GRAZING
     some = target[steep] if steep.any() else target
     interpolant = dataclasses.replace(interpolant, limits=np.stack((some.min(axis=0), some.max(axis=0))))
     x, y = (None, None) if table.place is None else table.place.T
     return Radial(interpolant, logarithm=how.logarithm, folded=how.folded, flat=flat, x=x, y=y), found, scales
-
-
-def _target(
-    table: Table, at: np.ndarray, albedo: np.ndarray | None, logarithm: bool
-) -> tuple[np.ndarray, np.ndarray]:
-    """What s is to be at samples `at` of the table (M, C), and the light by which what it misses is seen (M,)."""
-    value, light = table.value[at], table.wi[at, 2]
-    if albedo is not None:
-        colour = albedo[table.site[at]]
-        value, light = value / colour, light * colour.mean(axis=1)
-    return np.log(np.maximum(value, DARKEST * ordinary(value))) if logarithm else value, light
 
 
 def _over_sites(
@@ -231,7 +223,8 @@ def _over_sites(
         (model,) = regional.values()
         return model if albedo is None else Scaled(model, albedo)
     colour = 1.0 if albedo is None else albedo
-    return Sum(tuple(Scaled(model, colour * (labels == name)[:, None]) for name, model in regional.items()))
+    own = {name: (np.asarray(labels) == name)[:, None] for name in regional}
+    return Sum(tuple(Scaled(model, colour * own[name]) for name, model in regional.items()))
 
 
 def _bright(radiance: np.ndarray) -> np.ndarray:
