@@ -125,6 +125,7 @@ from .rendering.prefiltered import render_prefiltered as render_prefiltered
 from .rendering.reflection_map import reflection_map as reflection_map
 from .rendering.relight import Relightable as Relightable
 from .rendering.relight import relight as relight
+from .rendering.relight import relit_confidence as relit_confidence
 from .rendering.shrm import SHRM as SHRM
 from .rendering.shrm import prefilter as prefilter
 from .rendering.split_sum import split_sum as split_sum

@@ -147,6 +147,24 @@ def test_what_was_shared_is_rendered_under_other_light(capsys, tmp_path, thing):
     assert gn.read_image(tmp_path / "image.png", encoding="srgb").max() > 0.1
 
 
+def test_how_far_to_trust_what_is_rendered_is_drawn(capsys, tmp_path, thing):
+    image, trust = tmp_path / "image.exr", tmp_path / "trust.exr"
+    found = []
+    # Lights of the capture reach down to some 60 degrees.
+    for sun in ("0,.3,1:3", "1,0,-.9:3"):
+        code, out, err = run(capsys, "render", thing, "-o", image, "--sun", sun, "--confidence", trust)
+        assert (code, out) == (0, f"{image}\n{trust}\n"), err
+        found.append(gn.read_image(trust)[..., 0])
+    mask = gn.read_relightable(thing).view.mask
+    assert np.all(found[0][~mask] == 0) and found[0].max() <= 1 and found[0].min() >= 0
+    lit = gn.read_image(image).max(axis=2) > 0
+    assert np.median(found[0][mask]) > 0.95
+    assert np.median(found[1][mask & lit]) < 0.5
+    code, _, err = run(capsys, "render", "-o", image, "--confidence", trust)
+    assert code == 2
+    assert "goes with a .gonio" in err
+
+
 def test_a_capture_without_normals_goes_through_photometric_stereo(capsys, tmp_path, folder):
     bare = tmp_path / "bare"
     shutil.copytree(folder, bare, ignore=shutil.ignore_patterns("normals.png", "truth", "*.toml"))

@@ -1,5 +1,6 @@
 """Facts about .gonio files that hold what reflectance sharing found of one view."""
 
+import dataclasses
 import io
 import json
 import zipfile
@@ -9,10 +10,11 @@ import pytest
 from reference.archives import rewritten, with_fields
 
 import gonio as gn
+from gonio.brdf.coverage import Coverage
 from gonio.brdf.radial import Interpolant, Radial
 from gonio.capture.simulation import from_above
 from gonio.files.relightable import read_relightable, write_relightable
-from gonio.rendering.relight import Relightable, relight
+from gonio.rendering.relight import Relightable, relight, relit_confidence
 
 SUN = gn.Directional(np.array([0.6, 0, 0.8]), [3.0, 3.0, 3.0])
 
@@ -37,6 +39,7 @@ def materials(rng, view):
         "homogeneous": radial(rng, 3),
         "gray": radial(rng, 3, limits[:, :1], channels=1),
         "spatial": spatial,
+        "covered": dataclasses.replace(spatial, coverage=Coverage(rng.random((9, 5)), 0.125)),
         "flat": radial(rng, 2, limits, flat=True),
         "the paper's": radial(rng, 5, logarithm=False, folded=False, x=x, y=y),
         "scaled": spatial * rng.random((*view.mask.shape, 3)),
@@ -45,7 +48,7 @@ def materials(rng, view):
     }
 
 
-CASES = ["homogeneous", "gray", "spatial", "flat", "the paper's", "scaled", "of one colour", "sum"]
+CASES = ["homogeneous", "gray", "spatial", "covered", "flat", "the paper's", "scaled", "of one colour", "sum"]
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -62,6 +65,9 @@ def test_what_was_written_is_read(tmp_path, rng, view, case):
     image = relight(thing, SUN)
     assert image.max() > 0.1
     np.testing.assert_allclose(relight(read, SUN), image, rtol=1e-4, atol=1e-5)
+    trust = relit_confidence(read, SUN)
+    np.testing.assert_allclose(trust, relit_confidence(thing, SUN), atol=1e-3)
+    assert (trust[view.mask].min() < 0.9) == (case == "covered")
 
 
 def test_the_same_thing_makes_the_same_file(tmp_path, rng, view):

@@ -187,6 +187,24 @@ def test_a_colour_is_what_is_left_when_the_highlight_is_known():
     assert spread[1] < 0.7 * spread[0]
 
 
+def test_confidence_falls_as_the_error_grows_beyond_the_photographs(ball):
+    from_45 = [k for k in range(12) if ball.directions[k, 2] > 0.8]
+    material = share_reflectance(ball.select(from_45).reflectance(), centres=200, scales=SCALES).value.material
+    trusted, wrong = [], []
+    for theta_d in (10, 25, 50, 65, 80):
+        wi, to_eye = gn.from_half_difference(np.linspace(0, 0.3, 40), 0.0, np.radians(theta_d), np.pi / 2)
+        trusted.append(np.mean(material.confidence(wi, to_eye)))
+        truth = PLASTIC.f(wi, to_eye)
+        wrong.append(np.sqrt(np.mean((material.f(wi, to_eye) - truth) ** 2) / np.mean(truth**2)))
+    # Photographs end where theta_d is some 18 degrees.
+    assert trusted[0] > 0.95
+    assert wrong[0] < 0.02
+    assert np.all(np.diff(trusted) <= 0)
+    assert np.all(np.diff(wrong) > 0)
+    assert trusted[-1] < 0.3 and wrong[-1] > 0.7
+    assert np.all(PLASTIC.confidence(wi, to_eye) == 1)
+
+
 def test_one_photograph_shows_one_difference_angle_and_leaves_it_out(ball):
     fit = share_reflectance(ball.select([1]).reflectance(), centres=60)
     assert isinstance(fit.value.material, Radial)

@@ -51,6 +51,14 @@ class Sum(BRDF):
     def _f(self, xp: Any, wi: Array, wo: Array) -> Array:
         return functools.reduce(operator.add, (term._f(xp, wi, wo) for term in self.terms))
 
+    def confidence(self, wi: Array, wo: Array) -> Array:
+        """The mean of the terms', each weighted by what it reflects."""
+        xp, wi, wo = floats(wi, wo)
+        strengths = [xp.mean(term.evaluate(xp, wi, wo), axis=-1) for term in self.terms]
+        trusted = [s * term.confidence(wi, wo) for s, term in zip(strengths, self.terms, strict=True)]
+        total = functools.reduce(operator.add, strengths)
+        return xp.where(total > 0, functools.reduce(operator.add, trusted) / xp.where(total > 0, total, 1.0), 1.0)
+
     def lobes(self) -> tuple[BRDF, ...]:
         return tuple(lobe for term in self.terms for lobe in term.lobes())
 
@@ -96,10 +104,15 @@ class Scaled(BRDF):
     bounds: ClassVar[dict[str, Bounds]] = {"factor": Bounds(0.0, sys.float_info.max, colour=True)}
 
     def evaluate(self, xp: Any, wi: Array, wo: Array) -> Array:
+        if is_numpy(self.factor) and not np.any(self.factor):  # as beside the sites of a region
+            return like(self.factor, wi) * xp.zeros_like((wi + wo)[..., :1])
         return like(self.factor, wi) * self.model.evaluate(xp, wi, wo)
 
     def _f(self, xp: Any, wi: Array, wo: Array) -> Array:
         return like(self.factor, wi) * self.model._f(xp, wi, wo)
+
+    def confidence(self, wi: Array, wo: Array) -> Array:
+        return self.model.confidence(wi, wo)
 
     def lobes(self) -> tuple[BRDF, ...]:
         return tuple(Scaled(lobe, self.factor) for lobe in self.model.lobes())

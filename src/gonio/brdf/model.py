@@ -115,6 +115,11 @@ class BRDF(Parametric, ABC):
         cosine = cos_theta(wi) + xp.zeros_like(cos_theta(wo))
         return xp.where(cosine > 0, cosine / np.pi, xp.zeros_like(cosine))
 
+    def confidence(self, wi: Array, wo: Array) -> Array:
+        """How far to trust f there, (...) in [0, 1]: 1 of a formula, less far from what a fit was given."""
+        xp, wi, wo = floats(wi, wo)
+        return xp.ones_like((wi + wo)[..., 0])
+
     def lobes(self) -> tuple[BRDF, ...]:
         """Models of one lobe each whose sum is this one: each may be sampled and integrated by itself."""
         return (self,)

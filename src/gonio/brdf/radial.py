@@ -30,6 +30,7 @@ from .._kernels import radial as kernels
 from ..arrays import Array, floats, is_numpy, like, require_broadcast, require_finite, to_numpy
 from ..directions import uvw
 from ..errors import ArrayError, ParameterError
+from .coverage import Coverage
 from .model import BRDF, Bounds
 from .pairs import through
 
@@ -138,7 +139,8 @@ class Radial(BRDF):
     """f of an `interpolant` whose coordinates are (x, y) where given, u, v, and w unless `flat`, in this order.
 
     `logarithm`: it is log f, held below 80; otherwise f, cut at zero. `folded`: v is abs(v). `x`, `y`: numbers or
-    (...), which may vary over sites and be textures, in the units of the fit; both or none.
+    (...), which may vary over sites and be textures, in the units of the fit; both or none. `coverage`: of the samples
+    that it was fitted to, in scaled coordinates, if known.
 
     Raises `ParameterError` where the interpolant has another number of coordinates, or one of x and y is missing.
     """
@@ -149,6 +151,7 @@ class Radial(BRDF):
     flat: bool = False
     x: Array = None
     y: Array = None
+    coverage: Coverage | None = None
 
     bounds: ClassVar[dict[str, Bounds]] = {name: Bounds(-sys.float_info.max, sys.float_info.max) for name in ("x", "y")}
 
@@ -160,6 +163,8 @@ class Radial(BRDF):
         d = self.interpolant.centres.shape[1]
         if d != len(names):
             raise ParameterError(f"Radial: the interpolant has {d} coordinates; ({', '.join(names)}) are wanted.")
+        if self.coverage is not None and self.coverage.points.shape[1] != d:
+            raise ParameterError(f"Radial: the coverage has {self.coverage.points.shape[1]} coordinates, not {d}.")
         if self.x is not None:
             require_broadcast(x=self.x, y=self.y)
 
@@ -172,6 +177,13 @@ class Radial(BRDF):
         if self.x is not None:
             q = (like(self.x, u), like(self.y, u), *q)
         return xp.stack(xp.broadcast_arrays(*q), axis=-1)
+
+    def confidence(self, wi: Array, wo: Array) -> Array:
+        """By the distance to the nearest sample (`coverage`); 1 where the samples are not known."""
+        if self.coverage is None:
+            return super().confidence(wi, wo)
+        q = self.coordinates(wi, wo)
+        return self.coverage.confidence(q * like(self.interpolant.scales, q))
 
     def _f(self, xp: Any, wi: Array, wo: Array) -> Array:
         s = self.interpolant(self.coordinates(wi, wo))

@@ -45,6 +45,9 @@ def render(
     shadows: bool = typer.Option(False, "--shadows", help="Trace shadow rays."),
     maps_file: Path | None = typer.Option(None, "--maps", help="An SHRM (gonio prefilter --brdf): look-ups, no sums."),
     compare: bool = typer.Option(False, "--compare", help="Maps, sum over the light, ten times their difference."),
+    confidence: Path | None = typer.Option(
+        None, "--confidence", help="Of a .gonio: also an image of how far to trust each pixel, 0 to 1."
+    ),
     eye: str = typer.Option("2.6,-3.2,1.6", "--eye", help="The camera's place x,y,z, z up, in radii of the shape."),
     field_of_view: float = typer.Option(34.0, "--fov", help="Vertical field of view in degrees."),
     supersample: int = typer.Option(2, "--supersample", help="Rays a pixel along each side."),
@@ -58,7 +61,11 @@ def render(
     from gonio.errors import ParameterError
     from gonio.files.images import require_writable
 
-    require_writable(output)
+    for path in (output, confidence):
+        if path:
+            require_writable(path)
+    if confidence and not thing:
+        raise ParameterError("--confidence is of what was fitted: it goes with a .gonio of gonio share.")
     if thing:
         if shape != "sphere" or maps_file or compare or shadows:
             raise ParameterError(
@@ -69,6 +76,11 @@ def render(
             image = gn.relight(seen, room, samples, progress)
         write(output, image, exposure, curve)
         typer.echo(str(output))
+        if confidence:
+            with bar("confidence") as progress:
+                trust = gn.relit_confidence(seen, room, progress=progress)
+            gn.write_image(confidence, trust)
+            typer.echo(str(confidence))
         return
     columns, rows = parse.size(size)
     material = parse.reflectance(brdf)

@@ -1,7 +1,8 @@
 """What reflectance sharing found of one view, in .gonio files (`archive.py`): kind "relightable".
 
-gonio.json      made; terms: [{logarithm, folded, flat}, ...], the Radial models that add up
+gonio.json      made; terms: [{logarithm, folded, flat, reach}, ...], the Radial models that add up
 term-K-NAME.npy centres (N, d), scales (d,), coefficients (N, C), polynomial (d + 1, C), limits (2, C), of term K;
+                samples (K, d) where they are known, with reach: its coverage;
                 x, y (rows, columns) where it is spatial; factor (rows, columns, C) or (C,) where it is scaled
 NAME.npy        mask (rows, columns) bool; position, lifted, normal, tangent, wo (sites, 3) of the mask, along its rows
 vertices, faces, uv.npy    of the shape, where it is known
@@ -16,6 +17,7 @@ import numpy as np
 
 from ..arrays import to_numpy
 from ..brdf.combine import Scaled, Sum
+from ..brdf.coverage import Coverage
 from ..brdf.model import BRDF
 from ..brdf.radial import Interpolant, Radial
 from ..errors import FileError, GonioError
@@ -43,6 +45,9 @@ def write_relightable(path: str | os.PathLike[str], thing: Relightable, made: st
         if not isinstance(term, Radial):
             raise FileError(f"{path}: a {type(term).__name__} is not written; Radial models are.")
         terms.append({name: getattr(term, name) for name in _FLAGS})
+        if term.coverage is not None:
+            terms[-1]["reach"] = term.coverage.reach
+            arrays[f"term-{k}-samples"] = to_numpy(term.coverage.points)
         arrays |= {f"term-{k}-{name}": to_numpy(getattr(term.interpolant, name)) for name in _INTERPOLANT}
         if term.interpolant.limits is not None:
             arrays[f"term-{k}-limits"] = to_numpy(term.interpolant.limits)
@@ -83,8 +88,15 @@ def _term(path: str | os.PathLike[str], k: int, term: Any, arrays: dict[str, np.
         raise FileError(f"{path}: terms[{k}] is {term!r:.80}; it has {', '.join(_FLAGS)}, each true or false.")
     own = {name: _array(path, arrays, f"term-{k}-{name}") for name in _INTERPOLANT}
     interpolant = Interpolant(**own, limits=arrays.get(f"term-{k}-limits"))
+    coverage = None
+    if (samples := arrays.get(f"term-{k}-samples")) is not None:
+        reach = term.get("reach")
+        if not isinstance(reach, float):
+            raise FileError(f"{path}: terms[{k}] has reach = {reach!r:.40}; a number is wanted where it has samples.")
+        coverage = Coverage(samples, reach)
     model: BRDF = Radial(
         interpolant,
+        coverage=coverage,
         x=arrays.get(f"term-{k}-x"),
         y=arrays.get(f"term-{k}-y"),
         **{name: term[name] for name in _FLAGS},

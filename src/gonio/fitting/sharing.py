@@ -24,6 +24,7 @@ import numpy as np
 
 from ..arrays import Array, to_numpy
 from ..brdf.combine import Scaled, Sum
+from ..brdf.coverage import Coverage
 from ..brdf.model import BRDF
 from ..brdf.radial import Radial
 from ..errors import ArrayError, ParameterError
@@ -209,7 +210,9 @@ def _shared(
     some = target[steep] if steep.any() else target
     interpolant = dataclasses.replace(interpolant, limits=np.stack((some.min(axis=0), some.max(axis=0))))
     x, y = (None, None) if table.place is None else table.place.T
-    return Radial(interpolant, logarithm=how.logarithm, folded=how.folded, flat=flat, x=x, y=y), found, scales
+    coverage = Coverage.of(q * interpolant.scales, how.seed)
+    model = Radial(interpolant, logarithm=how.logarithm, folded=how.folded, flat=flat, x=x, y=y, coverage=coverage)
+    return model, found, scales
 
 
 def _over_sites(

@@ -1,6 +1,7 @@
 """What a camera saw once, under any other light: sites, normals and reflectance are known, and nothing is traced.
 
     B(x) = sum_k f(x, wi_k, wo) E_k max(n.wi_k, 0)          at the pixels of a view
+    the same, each f times its confidence, over B           how far to trust it
 
 Not here: shadows that the shape casts, and other places of the eye (`render`, with a shape).
 """
@@ -9,10 +10,11 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
-from ..arrays import to_numpy
+from ..arrays import Array, to_numpy
 from ..brdf.model import BRDF
 from ..errors import ArrayError
 from ..lights.model import Light
@@ -63,3 +65,30 @@ def relight(
         if progress is not None:
             progress(low + some.size, at.size)
     return image.reshape(*mask.shape, 3)
+
+
+def relit_confidence(
+    thing: Relightable,
+    light: Light,
+    samples: int = FEWEST,
+    progress: Callable[[int, int], None] | None = None,
+) -> np.ndarray:
+    """How far to trust what `relight` answers, (rows, columns) in [0, 1]: the mean confidence of the light that makes
+    up a pixel; 1 where it is black, 0 where nothing is seen. samples, progress: as there, with fewer beams."""
+    trusted = Relightable(thing.view, _Trusted(thing.material), thing.shape)
+    part = relight(trusted, light, samples, progress).mean(axis=2)
+    whole = relight(thing, light, samples).mean(axis=2)
+    return np.where(whole > 0, part / np.where(whole > 0, whole, 1), thing.view.mask).astype(np.float32)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class _Trusted(BRDF):
+    """`model` as far as it can be trusted."""
+
+    model: BRDF
+
+    def evaluate(self, xp: Any, wi: Array, wo: Array) -> Array:
+        return self.model.evaluate(xp, wi, wo) * self.model.confidence(wi, wo)[..., None]
+
+    def _f(self, xp: Any, wi: Array, wo: Array) -> Array:
+        return self.model._f(xp, wi, wo) * self.model.confidence(wi, wo)[..., None]
