@@ -165,6 +165,29 @@ def test_how_far_to_trust_what_is_rendered_is_drawn(capsys, tmp_path, thing):
     assert "goes with a .gonio" in err
 
 
+def test_lobes_of_chosen_pixels_are_drawn(capsys, tmp_path, thing):
+    picture = tmp_path / "lobes.png"
+    code, out, err = run(capsys, "info", thing, "--picture", picture, "--json")
+    assert code == 0, err
+    facts = json.loads(out)
+    assert facts["kind"] == "shared material"
+    assert facts["term 0"] == "200 centres in 5 dimensions, 3 channels, of log f"
+    automatic = picture.read_bytes()
+    assert gn.image_info(picture).columns > 900
+    code, _, err = run(capsys, "info", thing, "--picture", picture, "--pixels", "16,16;12,20")
+    assert code == 0, err
+    assert picture.read_bytes() != automatic
+    for pixels, message in (
+        ("99,1", "row,column within (32, 32)"),
+        ("1", "row,column"),
+        ("0,0", "nothing was seen there"),
+        (";".join(["16,16"] * 7), "six at most"),
+    ):
+        code, _, err = run(capsys, "info", thing, "--picture", picture, "--pixels", pixels)
+        assert code == 2
+        assert message in err
+
+
 def test_a_capture_without_normals_goes_through_photometric_stereo(capsys, tmp_path, folder):
     bare = tmp_path / "bare"
     shutil.copytree(folder, bare, ignore=shutil.ignore_patterns("normals.png", "truth", "*.toml"))

@@ -27,10 +27,11 @@ def info(
     files: list[Path] = typer.Argument(..., help="Images, environment maps, BRDFs, meshes; folders of captures."),
     as_json: bool = typer.Option(False, "--json", help="One JSON object a file, a line each."),
     picture: Path | None = typer.Option(None, "--picture", help="A PNG to look at: an image, or the lobes of BRDFs."),
+    pixels: str = typer.Option("", "--pixels", help="Of a .gonio of gonio share, whose lobes to draw: row,column;..."),
 ) -> None:
     """Say what files hold: sizes, formats, ranges, albedos, what looks wrong."""
     if picture:
-        _draw(files, picture)
+        _draw(files, picture, pixels)
     for path in files:
         facts = describe(path)
         if as_json:
@@ -56,14 +57,14 @@ def describe(path: Path) -> dict[str, Any]:
     if suffix in MESHES:
         return _mesh(path)
     if suffix in MAPS:
-        return _shrm(path) if suffix == ".gonio" else _texture(path)
+        return _gonio(path) if suffix == ".gonio" else _texture(path)
     if suffix == FITS:
         return _fits(path)
     known = " ".join((*IMAGES, *BRDFS, FITS, *MESHES, *MAPS))
     raise FileError(f"{path}: not a kind of file that gonio knows ({known}, and camera raw).")
 
 
-def _draw(files: list[Path], picture: Path) -> None:
+def _draw(files: list[Path], picture: Path, pixels: str) -> None:
     """One image, exposed for its own brightness, or the lobes of BRDF files together."""
     import gonio as gn
     from gonio.errors import ParameterError
@@ -77,12 +78,40 @@ def _draw(files: list[Path], picture: Path) -> None:
 
         contact_sheet(picture, _captured(files[0]))
         return
-    if kinds <= set(BRDFS):
+    if len(files) == 1 and kinds == {".gonio"}:
+        _draw_lobes(files[0], picture, pixels)
+    elif kinds <= set(BRDFS):
         lobes(picture, {path.stem: gn.read_brdf(path) for path in files})
     elif len(files) == 1 and kinds <= set(IMAGES + RAW):
         gn.write_image(picture, gn.tone_map(gn.read_image(files[0]).clip(0), exposure=None))
     else:
-        raise ParameterError("--picture shows one image or capture, or BRDF files together.")
+        raise ParameterError("--picture shows one image, capture or shared material, or BRDF files together.")
+
+
+def _draw_lobes(path: Path, picture: Path, pixels: str) -> None:
+    """The lobes of a shared material at pixels of its view."""
+    import gonio as gn
+    from gonio.errors import ParameterError
+    from gonio.viewer.lobes import lobes_picture, spread_pixels
+
+    from . import parse
+
+    thing = gn.read_relightable(path)
+    mask = thing.view.mask
+    chosen = spread_pixels(mask)
+    if pixels:
+        chosen = []
+        for text in pixels.split(";"):
+            place = parse.numbers(text)
+            if len(place) != 2 or not all(0 <= k < n and k == int(k) for k, n in zip(place, mask.shape, strict=True)):
+                raise ParameterError(f"--pixels {text}: row,column within {mask.shape} is wanted.")
+            row, column = int(place[0]), int(place[1])
+            if not mask[row, column]:
+                raise ParameterError(f"--pixels {text}: nothing was seen there.")
+            chosen.append((row, column))
+        if len(chosen) > 6:
+            raise ParameterError(f"--pixels {pixels}: {len(chosen)} pixels; six at most are drawn.")
+    lobes_picture(picture, thing, chosen)
 
 
 def _image(path: Path) -> dict[str, Any]:
@@ -224,6 +253,43 @@ def _mesh(path: Path) -> dict[str, Any]:
         "low": low.tolist(),
         "high": high.tolist(),
     }
+
+
+def _gonio(path: Path) -> dict[str, Any]:
+    from gonio.files.archive import kind_of
+
+    return _relightable(path) if kind_of(path) == "relightable" else _shrm(path)
+
+
+def _relightable(path: Path) -> dict[str, Any]:
+    import numpy as np
+
+    import gonio as gn
+    from gonio.brdf.combine import Scaled, Sum
+    from gonio.brdf.radial import Radial
+
+    thing = gn.read_relightable(path)
+    material = thing.material
+    terms = [
+        term.model if isinstance(term, Scaled) else term
+        for term in (material.terms if isinstance(material, Sum) else (material,))
+    ]
+    facts: dict[str, Any] = {
+        "kind": "shared material",
+        "rows": thing.view.mask.shape[0],
+        "columns": thing.view.mask.shape[1],
+        "object": f"{thing.view.mask.mean():.1%} of the pixels",
+        "shape": "unknown" if thing.shape is None else f"{len(thing.shape.faces)} faces",
+    }
+    for k, term in enumerate(terms):
+        assert isinstance(term, Radial)
+        of = term.interpolant
+        facts[f"term {k}"] = (
+            f"{len(of.centres)} centres in {of.centres.shape[1]} dimensions, {of.coefficients.shape[1]} channels, "
+            f"of {'log f' if term.logarithm else 'f'}"
+        )
+        facts[f"scales of term {k}"] = np.asarray(of.scales).tolist()
+    return facts
 
 
 def _shrm(path: Path) -> dict[str, Any]:

@@ -53,9 +53,7 @@ def read_archive(
     try:
         with zipfile.ZipFile(path) as archive:
             entries = {entry.filename: entry for entry in archive.infolist()}
-            if _MANIFEST not in entries or entries[_MANIFEST].file_size > _LONGEST_MANIFEST:
-                raise FileError(f"{path} is no .gonio file: it has no {_MANIFEST}.")
-            fields = json.loads(archive.read(_MANIFEST))
+            fields = _manifest(path, archive)
             _require_kind(path, fields, kind, version)
             arrays, left = {}, memory_limit
             for name, entry in entries.items():
@@ -67,6 +65,24 @@ def read_archive(
     except _DAMAGE as error:
         raise FileError(f"{path} is damaged, or no .gonio file ({error}). Fetch or write it again.") from error
     return fields, arrays
+
+
+def kind_of(path: str | os.PathLike[str]) -> str:
+    """The kind of a .gonio file. Raises `FileError` where it is none."""
+    require_file(Path(path))
+    try:
+        with zipfile.ZipFile(path) as archive:
+            fields = _manifest(path, archive)
+    except _DAMAGE as error:
+        raise FileError(f"{path} is damaged, or no .gonio file ({error}). Fetch or write it again.") from error
+    return str(fields.get("gonio")) if isinstance(fields, dict) else ""
+
+
+def _manifest(path: str | os.PathLike[str], archive: zipfile.ZipFile) -> Any:
+    entry = {entry.filename: entry for entry in archive.infolist()}.get(_MANIFEST)
+    if entry is None or entry.file_size > _LONGEST_MANIFEST:
+        raise FileError(f"{path} is no .gonio file: it has no {_MANIFEST}.")
+    return json.loads(archive.read(entry))
 
 
 def _require_kind(path: str | os.PathLike[str], fields: Any, kind: str, version: int) -> None:
