@@ -6,7 +6,7 @@
 M is the interpolant's, in which a unit is a unit wherever the function bends alike. `reach` is what thinning took: of a
 hundred samples ninety-nine lie within it of a q_k. LENGTH is such that the confidence is roughly the part of radiance
 that is right: of balls whose photographs end at theta_d = 45 degrees and m_w = .5, a plastic, a gloss and a metal, it
-is .66, .48, .28 at 59, 65, 75 degrees, where .21 to .60, .44 to .81, .81 to .97 of radiance are wrong.
+is .67, .48, .28 at 59, 65, 75 degrees, where .21 to .63, .44 to .82, .81 to .97 of radiance are wrong.
 """
 
 from __future__ import annotations
