@@ -39,7 +39,7 @@ def materials(rng, view):
         "homogeneous": radial(rng, 3),
         "gray": radial(rng, 3, limits[:, :1], channels=1),
         "spatial": spatial,
-        "covered": dataclasses.replace(spatial, coverage=Coverage(rng.random((9, 5)), 0.125)),
+        "covered": dataclasses.replace(spatial, coverage=Coverage(rng.random((9, 5)), rng.uniform(0.5, 1, 5), 0.125)),
         "flat": radial(rng, 2, limits, flat=True),
         "the paper's": radial(rng, 5, logarithm=False, folded=False, x=x, y=y),
         "scaled": spatial * rng.random((*view.mask.shape, 3)),

@@ -140,7 +140,7 @@ class Radial(BRDF):
 
     `logarithm`: it is log f, held below 80; otherwise f, cut at zero. `folded`: v is abs(v). `x`, `y`: numbers or
     (...), which may vary over sites and be textures, in the units of the fit; both or none. `coverage`: of the samples
-    that it was fitted to, in scaled coordinates, if known.
+    that it was fitted to, if known.
 
     Raises `ParameterError` where the interpolant has another number of coordinates, or one of x and y is missing.
     """
@@ -182,8 +182,7 @@ class Radial(BRDF):
         """By the distance to the nearest sample (`coverage`); 1 where the samples are not known."""
         if self.coverage is None:
             return super().confidence(wi, wo)
-        q = self.coordinates(wi, wo)
-        return self.coverage.confidence(q * like(self.interpolant.scales, q))
+        return self.coverage.confidence(self.coordinates(wi, wo))
 
     def _f(self, xp: Any, wi: Array, wo: Array) -> Array:
         s = self.interpolant(self.coordinates(wi, wo))

@@ -2,7 +2,7 @@
 
 gonio.json      made; terms: [{logarithm, folded, flat, reach}, ...], the Radial models that add up
 term-K-NAME.npy centres (N, d), scales (d,), coefficients (N, C), polynomial (d + 1, C), limits (2, C), of term K;
-                samples (K, d) where they are known, with reach: its coverage;
+                samples (K, d), sample-scales (d,) where they are known, with reach: its coverage;
                 x, y (rows, columns) where it is spatial; factor (rows, columns, C) or (C,) where it is scaled
 NAME.npy        mask (rows, columns) bool; position, lifted, normal, tangent, wo (sites, 3) of the mask, along its rows
 vertices, faces, uv.npy    of the shape, where it is known
@@ -48,6 +48,7 @@ def write_relightable(path: str | os.PathLike[str], thing: Relightable, made: st
         if term.coverage is not None:
             terms[-1]["reach"] = term.coverage.reach
             arrays[f"term-{k}-samples"] = to_numpy(term.coverage.points)
+            arrays[f"term-{k}-sample-scales"] = to_numpy(term.coverage.scales)
         arrays |= {f"term-{k}-{name}": to_numpy(getattr(term.interpolant, name)) for name in _INTERPOLANT}
         if term.interpolant.limits is not None:
             arrays[f"term-{k}-limits"] = to_numpy(term.interpolant.limits)
@@ -93,7 +94,7 @@ def _term(path: str | os.PathLike[str], k: int, term: Any, arrays: dict[str, np.
         reach = term.get("reach")
         if not isinstance(reach, float):
             raise FileError(f"{path}: terms[{k}] has reach = {reach!r:.40}; a number is wanted where it has samples.")
-        coverage = Coverage(samples, reach)
+        coverage = Coverage(samples, _array(path, arrays, f"term-{k}-sample-scales"), reach)
     model: BRDF = Radial(
         interpolant,
         coverage=coverage,

@@ -39,6 +39,7 @@ from .validation import choose_scales
 
 _SINGLE = 1e-3  # range of w within which a photograph is of one theta_d
 _GRAZING = 0.15  # cosine of light below which noise is most of what f is
+_ASTRAY = 0.7  # what w weighs where it is asked how far from samples a fit can be trusted
 _STIFF = 0.03  # where nothing tells how noisy samples are
 _AGAIN = 2  # fits with weights by the one before
 _USUAL = 0.3  # log f that is off by less is no outlier
@@ -210,7 +211,7 @@ def _shared(
     some = target[steep] if steep.any() else target
     interpolant = dataclasses.replace(interpolant, limits=np.stack((some.min(axis=0), some.max(axis=0))))
     x, y = (None, None) if table.place is None else table.place.T
-    coverage = Coverage.of(q * interpolant.scales, how.seed)
+    coverage = Coverage.of(q, _diagonal(dataclasses.replace(scales, difference=_ASTRAY), spatial, flat), how.seed)
     model = Radial(interpolant, logarithm=how.logarithm, folded=how.folded, flat=flat, x=x, y=y, coverage=coverage)
     return model, found, scales
 
