@@ -3,9 +3,9 @@
     beyond(q) = max(min over k of |W (q - q_k)| - reach, 0)             q_k: where samples were, thinned
     confidence = exp(-beyond / LENGTH)
 
-W is that of the interpolant, but .7 for w: how far a fit goes astray depends on angles, not on its m_w. `reach` is what thinning
-took: of a hundred samples ninety-nine lie within it of a q_k. LENGTH is such that the confidence is about the part of
-radiance that is right (reproductions/confidence.py).
+W is that of the interpolant, but .7 for w: how far a fit goes astray depends on angles, not on its m_w. `reach` is what
+thinning took: of a hundred samples ninety-nine lie within it of a q_k. LENGTH is such that the confidence is about the
+part of radiance that is right (reproductions/confidence.py).
 """
 
 from __future__ import annotations
