@@ -1,4 +1,4 @@
-"""Reflectance sharing beside the figures of its paper: RS figures 7, 8, 9, 10 and 11.
+"""Reflectance sharing beside the figures of its paper: RS figures 7 to 12, and 18.
 
     python reproductions/reflectance_sharing.py DATA FOLDER
 
@@ -6,7 +6,9 @@ DATA holds brdf/merl-fits (docs: CONTRIBUTING). FOLDER gets sharing.csv and shar
 100 x 100 pixels by the forward model; RS had the measured metallic-blue of MERL, here it is its SGD fit. Errors are
 relative rms of radiance over photographs that were not used: over all pixels of all of them, as RS has it, and the
 median of the photographs' own, since grazing ones outshine the others by forty. RS read off its figures: converged
-below 1,000 centres (7), below 2,000 (10), five photographs with sharing as good as 150 without (11).
+below 1,000 centres (7), below 2,000 (10), five photographs with sharing as good as 150 without (11). Of figures 12, new
+views of what was photographed from one, and 18, all from one photograph, it has pictures alone: here the figures are
+degrees of the eye, and of theta_d.
 """
 
 from __future__ import annotations
@@ -37,10 +39,10 @@ def ball() -> np.ndarray:
     return np.stack((x, y, np.sqrt(np.where(inside, 1 - x * x - y * y, 0))), axis=-1)[inside]
 
 
-def photographed(material: BRDF, directions: np.ndarray, normals: np.ndarray) -> Photographs:
-    """For each light: which sites it lights, wi, wo there (local), and f."""
+def photographed(material: BRDF, directions: np.ndarray, normals: np.ndarray, eye: float = 0.0) -> Photographs:
+    """For each light: which sites it lights, wi, wo there (local), and f. The eye is `eye` radians from above."""
     frames, shots = gn.frame(normals), []
-    wo = gn.to_local(frames, np.array([0.0, 0, 1]))
+    wo = gn.to_local(frames, np.array([math.sin(eye), 0, math.cos(eye)]))
     for direction in directions:
         wi = gn.to_local(frames, direction)
         lit = np.flatnonzero((wi[:, 2] > 0.02) & (wo[:, 2] > 0.02))
@@ -177,6 +179,27 @@ def main(data: Path, folder: Path) -> None:
     for count in (5, 10, 50, 150):
         tell("11", "no sharing", count, 0, alone(photographed(graded, upper(count), normals), kept, len(normals)))
 
+    # Light from where none of the five photographs had it, 30 degrees from above; the eye moves away from above.
+    shots, light = photographed(graded, upper(5), normals), gn.from_spherical(np.radians([30.0]), 2.0)
+    fit = share_reflectance(samples(shots), places, centres=2000, scales=Scales(0.1, 0.3))
+    for degrees in (0, 15, 30, 45, 60):
+        seen = photographed(graded, light, normals, math.radians(degrees))
+        tell("12", "five photographs", degrees, 2000, errors(fit.value.material, seen))
+
+    # One photograph, lit 20 degrees from the eye, tells f at theta_d = 10 degrees for all of theta_h.
+    one = photographed(graded, slices(9)[2:3], normals)
+    fits = {
+        "one photograph, one BRDF": share_reflectance(samples(one), centres=1000),
+        "one photograph, RS 15": share_reflectance(
+            samples(one), places, centres=2000, scales=Scales(1.0, stiffness=0.01)
+        ),
+    }
+    for degrees in (5, 10, 20, 30, 45, 60):
+        light = gn.from_spherical(np.radians([2.0 * degrees]), np.pi)
+        seen = photographed(graded, light, normals)
+        for name, found in fits.items():
+            tell("18", name, degrees, 2000, errors(found.value.material, seen))
+
     with (folder / "sharing.csv").open("w", newline="") as file:
         writer = csv.writer(file)
         writer.writerow(("figure", "model", "photographs", "centres or lobes", "error over all", "median error"))
@@ -227,7 +250,7 @@ def picture(path: Path, rows: list[tuple[str, str, int, int, float, float]]) -> 
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(16, 7), dpi=100, layout="constrained")
+    figure = Figure(figsize=(20, 7), dpi=100, layout="constrained")
     FigureCanvasAgg(figure)
     titles = {
         "7": ("RS 7: metallic-blue, 10 photographs", 3, "centres or lobes"),
@@ -235,12 +258,15 @@ def picture(path: Path, rows: list[tuple[str, str, int, int, float, float]]) -> 
         "9": ("RS 9: Oren-Nayar", 2, "photographs"),
         "10": ("RS 10: graded roughness", 3, "centres"),
         "11": ("RS 11: sharing or not", 2, "photographs"),
+        "12": ("RS 12: five photographs, other views", 2, "degrees of the eye from above"),
+        "18": ("RS 18: one photograph, other lights", 2, "theta_d, degrees"),
     }
     for k, (number, (title, column, label)) in enumerate(titles.items()):
-        axes = figure.add_subplot(2, 3, k + 1)
+        axes = figure.add_subplot(2, 4, k + 1)
         for model in dict.fromkeys(row[1] for row in rows if row[0] == number):
             x, y = np.array([(row[column], row[5]) for row in rows if row[0] == number and row[1] == model]).T
-            axes.loglog(x, y, marker="o", markersize=3, label=model)
+            draw = axes.semilogy if number in ("12", "18") else axes.loglog
+            draw(x, y, marker="o", markersize=3, label=model)
         axes.set_title(title, fontsize=10)
         axes.set_xlabel(label)
         axes.set_ylabel("median relative rms")
