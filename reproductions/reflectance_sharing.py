@@ -186,7 +186,7 @@ def main(data: Path, folder: Path) -> None:
         seen = photographed(graded, light, normals, math.radians(degrees))
         tell("12", "five photographs", degrees, 2000, errors(fit.value.material, seen))
 
-    # One photograph, lit 20 degrees from the eye, tells f at theta_d = 10 degrees for all of theta_h.
+    # One photograph, lit 45 degrees from the eye, tells f at theta_d = 22.5 degrees for all of theta_h.
     one = photographed(graded, slices(9)[2:3], normals)
     fits = {
         "one photograph, one BRDF": share_reflectance(samples(one), centres=1000),
