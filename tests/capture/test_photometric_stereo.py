@@ -149,6 +149,17 @@ def test_near_lights_are_seen_from_each_pixel():
     assert np.degrees(off) > 10
 
 
+def test_lamps_that_look_away_do_not_count():
+    flat = gn.HeightField(np.zeros((8, 8)))
+    places = 25 * np.array([[0.0, 0, 1], [0.8, 0, 1], [-0.4, 0.7, 1], [-0.4, -0.7, 1], [0.3, 0.3, 1]])
+    axis = np.array([[0.0, 0, -1]] * 4 + [[0, 0, 1]])
+    capture = gn.simulate(flat, gn.Lambert(0.5), gn.near_lights(places, axis=axis), flat.camera())
+    relief = gn.photometric_stereo(capture)
+    assert_allclose(relief.normals, np.broadcast_to([0.0, 0, 1], (8, 8, 3)), atol=1e-5)
+    assert_allclose(relief.albedo, 0.5 / np.pi, rtol=1e-5)
+    assert (relief.used == 4).all()
+
+
 def test_pixels_taken_in_parts_have_the_same_normals(monkeypatch):
     normals, mask = ball(24)
     capture = gn.Capture(Held(photographed(normals, dome())), gn.distant_lights(dome()), mask)

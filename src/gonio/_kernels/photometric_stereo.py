@@ -31,25 +31,22 @@ def gather(radiance, clipped, low, scale, values):  # type: ignore[no-untyped-de
             values[i, k] = np.nan if clipped[k, p] else value
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
 def colour(radiance, low, scale, lights, g, counts, albedo):  # type: ignore[no-untyped-def]
     """`albedo` (pixels, 3), of pixels from `low` on: least squares of radiance (N, all, 3) times scale (N, 3) over the
     photographs that count, counts (pixels, N)."""
-    pixels, n = counts.shape
-    bottom, last = np.zeros(pixels), lights.shape[0] - 1
-    albedo[:] = 0.0
-    for k in range(n):
-        for i in range(pixels):
-            if counts[i, k]:
-                j = min(i, last)
-                cosine = lights[j, 0, k] * g[i, 0] + lights[j, 1, k] * g[i, 1] + lights[j, 2, k] * g[i, 2]
-                for c in range(3):
-                    albedo[i, c] += cosine * scale[k, c] * radiance[k, low + i, c]
-                bottom[i] += cosine * cosine
-    for i in range(pixels):
-        length = _length(g[i])
-        for c in range(3):
-            albedo[i, c] = albedo[i, c] * length / bottom[i] if bottom[i] > 0 else np.nan
+    last = lights.shape[0] - 1
+    for i in range(counts.shape[0]):
+        own, x, y, z = lights[min(i, last)], g[i, 0], g[i, 1], g[i, 2]
+        red = green = blue = bottom = 0.0
+        for k in range(counts.shape[1]):
+            cosine = (own[0, k] * x + own[1, k] * y + own[2, k] * z) * counts[i, k]
+            red += cosine * scale[k, 0] * radiance[k, low + i, 0]
+            green += cosine * scale[k, 1] * radiance[k, low + i, 1]
+            blue += cosine * scale[k, 2] * radiance[k, low + i, 2]
+            bottom += cosine * cosine
+        factor = _length(g[i]) / bottom if bottom > 0 else np.nan
+        albedo[i, 0], albedo[i, 1], albedo[i, 2] = red * factor, green * factor, blue * factor
 
 
 @njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
@@ -62,6 +59,30 @@ def _solve(row, lights, weights, g, inverse):  # type: ignore[no-untyped-def]
         a, b, c = a + l * along[k], b + l * up[k], c + l * out[k]
         d, e, f = d + m * up[k], e + m * out[k], f + n * out[k]
         x, y, z = x + l * row[k], y + m * row[k], z + n * row[k]
+    return _inverted(a, b, c, d, e, f, x, y, z, g, inverse)
+
+
+@njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
+def _resolve(row, known, lights, dark, close, robust, g, inverse):  # type: ignore[no-untyped-def]
+    """`_solve` of what faces the light by `g`, or sees it all the same, weighted 1, or over its absolute residual."""
+    along, up, out = lights[0], lights[1], lights[2]
+    gx, gy, gz = g[0], g[1], g[2]
+    a = b = c = d = e = f = x = y = z = 0.0
+    for k in range(row.size):
+        expected = along[k] * gx + up[k] * gy + out[k] * gz
+        weight = known[k] if expected > 0 or row[k] > dark else 0.0
+        if robust:
+            weight /= max(abs(row[k] - expected), close)
+        l, m, n = weight * along[k], weight * up[k], weight * out[k]
+        a, b, c = a + l * along[k], b + l * up[k], c + l * out[k]
+        d, e, f = d + m * up[k], e + m * out[k], f + n * out[k]
+        x, y, z = x + l * row[k], y + m * row[k], z + n * row[k]
+    return _inverted(a, b, c, d, e, f, x, y, z, g, inverse)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _inverted(a, b, c, d, e, f, x, y, z, g, inverse):  # type: ignore[no-untyped-def]
+    """g = M^-1 (x, y, z), M of rows a b c, b d e, c e f, and the inverse; False where M is singular."""
     p, q, r = d * f - e * e, c * e - b * f, b * e - c * d
     s, t, u = a * f - c * c, b * c - a * e, a * d - b * b
     determinant = a * p + b * q + c * r
@@ -82,17 +103,31 @@ def _expect(lights, g, expected):  # type: ignore[no-untyped-def]
         expected[k] = lights[0, k] * g[0] + lights[1, k] * g[1] + lights[2, k] * g[2]
 
 
-@njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
-def _reweigh(row, known, expected, dark, close, robust, weights):  # type: ignore[no-untyped-def]
-    """Weights of those that face the light, or see it all the same: 1, or over their absolute residuals."""
-    for k in range(row.size):
-        seen = known[k] if expected[k] > 0 or row[k] > dark else 0.0
-        weights[k] = seen / max(abs(row[k] - expected[k]), close) if robust else seen
-
-
 @njit(cache=True, nogil=True, error_model="numpy")
 def _length(g):  # type: ignore[no-untyped-def]
     return math.sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2])
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _median(x, n):  # type: ignore[no-untyped-def]
+    """The median of the first n of `x`, which are turned about: Hoare's selection, without branches."""
+    low, high, middle = 0, n - 1, n // 2
+    while low < high:
+        at = (low + high) // 2
+        pivot, x[at] = x[at], x[high]
+        below = low
+        for i in range(low, high):
+            value = x[i]
+            x[i], x[below] = x[below], value
+            below += value < pivot
+        x[high], x[below] = x[below], pivot
+        if below == middle:
+            break
+        if below < middle:
+            low = below + 1
+        else:
+            high = below - 1
+    return x[middle] if n % 2 else (x[:middle].max() + x[middle]) / 2
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -105,7 +140,7 @@ def _choose(row, known, expected, length, robust, sizes, weights):  # type: igno
             sizes[used] = abs(row[k] - expected[k])
             used += 1
     if robust and used > 0:
-        limit = max(3 * _SPREAD * np.median(sizes[:used]), 3 * _CLOSE * length)
+        limit = max(3 * _SPREAD * _median(sizes, used), 3 * _CLOSE * length)
         for k in range(row.size):
             if abs(row[k] - expected[k]) > limit:
                 weights[k] = 0.0
@@ -132,9 +167,7 @@ def solve(values, lights, robust, found, counts, residual, error):  # type: igno
         rounds = 0
         while good and rounds < ROUNDS:
             length, x, y, z = _length(g), g[0], g[1], g[2]
-            _expect(own, g, expected)
-            _reweigh(row, known, expected, _DARK * length, _CLOSE * length, robust, weights)
-            good = _solve(row, own, weights, g, inverse)
+            good = _resolve(row, known, own, _DARK * length, _CLOSE * length, robust, g, inverse)
             rounds += 1
             if abs(g[0] - x) + abs(g[1] - y) + abs(g[2] - z) <= _CLOSE * length:
                 break

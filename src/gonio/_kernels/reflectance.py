@@ -37,10 +37,11 @@ def reflect(  # type: ignore[no-untyped-def]
     for s in range(radiance.shape[1]):
         for k in range(radiance.shape[0]):
             E, w = irradiance[k, min(s, last)], direction[k, min(s, last)]
-            for i in range(3):
+            cosine = frames[s, 2, 0] * w[0] + frames[s, 2, 1] * w[1] + frames[s, 2, 2] * w[2]
+            for i in range(2):
                 wi[s, k, i] = frames[s, i, 0] * w[0] + frames[s, i, 1] * w[1] + frames[s, i, 2] * w[2]
+            wi[s, k, 2] = cosine
             value[s, k, 0], value[s, k, 1], value[s, k, 2], weight[s, k] = np.nan, np.nan, np.nan, 0.0
-            cosine = wi[s, k, 2]
             if not (known[k, s] and facing[min(k, views), s] and cosine > 0 and E[0] > 0 and E[1] > 0 and E[2] > 0):
                 continue
             red, green, blue = radiance[k, s, 0], radiance[k, s, 1], radiance[k, s, 2]

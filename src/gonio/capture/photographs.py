@@ -8,12 +8,14 @@ Files are behind it (`files/photographs.py`), or arrays (`Held`). Radiance is re
 from __future__ import annotations
 
 import dataclasses
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
+from .._kernels.photographs import pick
 from ..arrays import Array, frozen, require_finite, to_numpy
 from ..errors import ArrayError
 
@@ -44,8 +46,9 @@ class Photographs(ABC):
         clipped = np.empty((len(self), len(at)), bool)
         for k in range(len(self)):
             one = self.read(k)
-            np.take(one.radiance.reshape(-1, 3), at, axis=0, out=radiance[k], mode="clip")
-            np.take(one.clipped.reshape(-1), at, out=clipped[k], mode="clip")
+            whole, marked = one.radiance.reshape(-1, 3), one.clipped.reshape(-1)
+            whole.flags.writeable = marked.flags.writeable = False  # of the views only: one loop for all input
+            pick(whole, marked, at, radiance[k], clipped[k])
             if progress is not None:
                 progress(k + 1, len(self))
         return Photograph(radiance, clipped)
@@ -76,8 +79,11 @@ class Held(Photographs):
         object.__setattr__(self, "size", radiance.shape[1:3])
 
     def read(self, k: int) -> Photograph:
-        red, green, blue = np.moveaxis(self.radiance[k], -1, 0)
-        return Photograph(self.radiance[k], (red >= self.white) | (green >= self.white) | (blue >= self.white))
+        radiance = self.radiance[k]
+        if math.isinf(self.white):
+            return Photograph(radiance, np.zeros(self.size, bool))
+        red, green, blue = np.moveaxis(radiance >= self.white, -1, 0)
+        return Photograph(radiance, red | green | blue)
 
 
 class Chosen(Photographs):

@@ -22,7 +22,7 @@ from ..reflection import processors
 from .lighting import arriving, directions_from, directions_of, span_space
 from .model import Capture
 
-_PIXELS = 4096  # solved at once
+_PIXELS = 1024  # solved at once, while a cache holds them
 _NEAR = 1 << 18  # pairs of a pixel and a near light, whose directions are all held
 _MEMORY = 10**9  # bytes of the photographs that are held at once
 
@@ -49,8 +49,9 @@ def photometric_stereo(
     """Normals, albedo and how well they are known, on the mask of a capture whose lights are known.
 
     Lights may be near: then each pixel sees them from its own position, `capture.positions`. Clipped pixels do not
-    count. Memory is a gigabyte and the answer's, whatever the number of photographs: where they are more, they are read
-    a part of the pixels after the other, which is soon done from a store (`gonio ingest`) and slow from files.
+    count, nor do lamps that look away from one. Memory is a gigabyte and the answer's, whatever the number of
+    photographs: where they are more, they are read a part of the pixels after the other, which is soon done from a
+    store (`gonio ingest`) and slow from files.
     `progress(done, total)` hears of photographs in all parts, each when it is read and when it is worked through.
     Raises `ArrayError` where lights are unknown, fewer than three, or all in a plane.
     """
@@ -105,12 +106,14 @@ def _solve(
         some = slice(low, min(low + step, pixels))
         count = some.stop - low
         if distant is not None:
-            towards, irradiance = distant.T[None], common
+            towards, irradiance = np.ascontiguousarray(distant.T[None]), common
         else:
             towards, irradiance = np.empty((count, 3, n)), ones
             for k, light in enumerate(lights):
                 towards[..., k], E, _ = arriving(light, positions[at[some]])
-                radiance[k, some] /= E
+                lit = np.asarray((E > 0).all(axis=1))
+                radiance[k, some] /= np.where(lit[:, None], E, 1)
+                clipped[k, some] |= ~lit
         scale = 1 / (3 * irradiance)
         values, counts = np.empty((count, n)), np.empty((count, n), np.uint8)
         kernels.gather(radiance, clipped, low, scale, values)

@@ -66,12 +66,14 @@ class Reflectance:
 
     def __iter__(self) -> Iterator[ReflectanceSamples]:
         """A block for each photograph that lights any site."""
-        sites = self.capture.sites
+        sites, eye, wo = self.capture.sites, np.empty(0), np.empty(0)
         floor = self._floor if self.least else np.zeros(len(sites))
         for k in range(len(self.capture.photographs)):
             seen = self.capture.observe(k)
-            one = Observation(seen.radiance[None], seen.known[None], seen.wo)
-            wi, wo, value, weight = self._reflected(slice(k, k + 1), sites, one, floor)
+            if seen.wo is not eye:  # where the camera stands still, wo is that of the photograph before
+                eye, wo = seen.wo, np.asarray(to_local(sites.frames, seen.wo))
+            one = Observation(seen.radiance[None], seen.known[None], wo)
+            wi, value, weight = self._reflected(slice(k, k + 1), sites, one, floor, np.float64)
             lit = np.flatnonzero(weight)
             if lit.size:
                 parts = (np.take(x, lit, axis=0) for x in (wi[:, 0], wo, value[:, 0], weight[:, 0]))
@@ -93,7 +95,10 @@ class Reflectance:
             number = np.zeros(len(sites))
             kernels.brightness(seen.radiance, seen.known, self._arriving(every, sites)[1], floor, number)
             floor *= self.least / np.maximum(number, 1)
-        return Slices(*self._reflected(every, sites, seen, floor))
+        frames = sites.frames[:, None] if seen.wo.ndim == 3 else sites.frames
+        local = seen._replace(wo=np.asarray(to_local(frames, np.moveaxis(seen.wo, -2, 0))))
+        wi, value, weight = self._reflected(every, sites, local, floor, np.float32)
+        return Slices(wi, local.wo, value, weight)
 
     @cached_property
     def _floor(self) -> np.ndarray:
@@ -115,15 +120,13 @@ class Reflectance:
         return np.stack(direction), np.stack(irradiance), np.stack(distance)
 
     def _reflected(
-        self, some: slice, sites: Sites, seen: Observation, floor: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """wi, wo, value, weight of `Slices`, of photographs `some`."""
+        self, some: slice, sites: Sites, seen: Observation, floor: np.ndarray, dtype: type[np.floating]
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """wi, value, weight of `Slices`, of photographs `some`, wo of which is local, (S, 3) or (S, N, 3)."""
         direction, irradiance, distance = self._arriving(some, sites)
-        moving = seen.wo.ndim == 3
-        wo = np.asarray(to_local(sites.frames[:, None] if moving else sites.frames, np.moveaxis(seen.wo, -2, 0)))
-        facing = np.atleast_2d(wo[..., 2].T > 0)
+        facing = np.atleast_2d(seen.wo[..., 2].T > 0)
         shape = (len(sites), len(seen.radiance))
-        wi, value, weight = np.empty((*shape, 3)), np.empty((*shape, 3)), np.empty(shape)
+        wi, value, weight = (np.empty((*shape, *axes), dtype) for axes in ((3,), (3,), ()))
         kernels.reflect(
             seen.radiance, seen.known, facing, sites.frames, direction, irradiance, self.dark, floor, wi, value, weight
         )
@@ -133,7 +136,7 @@ class Reflectance:
                 w, far = (np.broadcast_to(a[k], (len(sites), *a.shape[2:]))[lit] for a in (direction, distance))
                 dark = lit[self.capture.shape.occluded(sites.lifted[lit], w, far)]
                 value[dark, k], weight[dark, k] = np.nan, 0
-        return wi, wo, value, weight
+        return wi, value, weight
 
 
 def radiance(capture: Observing) -> Iterator[RadianceSamples]:

@@ -11,11 +11,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from .._kernels.photographs import decode
 from ..capture.photographs import Photograph, Photographs
 from ..errors import FileError
 from .images import read_raster
@@ -52,7 +54,10 @@ class StoredPhotographs(Photographs):
         self._held: tuple[int, np.ndarray] | None = None
 
     def read(self, k: int) -> Photograph:
-        return photograph(self.path, self.raster(k), self.encoding)
+        count = self.size[0] * self.size[1]
+        radiance, clipped = np.empty((1, count, 3), np.float32), np.empty((1, count), bool)
+        self._decode(self.raster(k).samples.reshape(1, -1, 3), np.arange(count), np.arange(count), radiance, clipped)
+        return Photograph(radiance.reshape(*self.size, 3), clipped.reshape(self.size))
 
     def raster(self, k: int) -> Raster:
         """The samples of photograph k as its file had them."""
@@ -64,33 +69,52 @@ class StoredPhotographs(Photographs):
     def pixels(self, at: np.ndarray, progress: Callable[[int, int], None] | None = None) -> Photograph:
         radiance = np.empty((len(self.names), len(at), 3), np.float32)
         clipped = np.empty((len(self.names), len(at)), bool)
-        for some, here, codes in self._chunks(np.asarray(at), progress):
-            radiance[some, here], clipped[some, here] = photograph(self.path, Raster(codes), self.encoding)
+        for some, here, place, codes in self._chunks(np.asarray(at), progress):
+            self._decode(codes, place, here, radiance[some], clipped[some])
         return Photograph(radiance, clipped)
 
     def rasters(self, at: np.ndarray, progress: Callable[[int, int], None] | None = None) -> Raster:
         """The samples of all photographs at pixels `at` (P,), (N, P, 3), as their files had them."""
         samples = np.empty((len(self.names), len(at), 3), self.codes.dtype)
-        for some, here, codes in self._chunks(np.asarray(at), progress):
-            samples[some, here] = codes
+        for some, here, place, codes in self._chunks(np.asarray(at), progress):
+            samples[some, here] = codes[:, place]
         return Raster(samples)
 
     def _chunks(
         self, at: np.ndarray, progress: Callable[[int, int], None] | None
-    ) -> Iterator[tuple[slice, np.ndarray, np.ndarray]]:
-        """A chunk after the other: which photographs and which of `at` it has, and their codes."""
+    ) -> Iterator[tuple[slice, np.ndarray, np.ndarray, np.ndarray]]:
+        """A chunk after the other: which photographs, which of `at`, their places in it, its codes (n, all, 3)."""
         count, tiles = len(self.names), self._tiles(at)
         rows, columns = np.divmod(at, self.size[1])
         wanted = np.unique(tiles)
         for done, tile in enumerate(wanted):
             here = np.flatnonzero(tiles == tile)
             top, left = rows[here[0]] // _TILE * _TILE, columns[here[0]] // _TILE * _TILE
-            place = slice(top, top + _TILE), slice(left, left + _TILE)
+            bounds = slice(top, top + _TILE), slice(left, left + _TILE)
+            place = (rows[here] - top) * min(_TILE, self.size[1] - left) + columns[here] - left
             for low in range(0, count, _GROUP):
                 some = slice(low, low + _GROUP)
-                yield some, here, self._read((some, *place))[:, rows[here] - top, columns[here] - left]
+                codes = self._read((some, *bounds))
+                yield some, here, place, codes.reshape(len(codes), -1, 3)
                 if progress is not None:
                     progress(done * count + min(low + _GROUP, count), len(wanted) * count)
+
+    def _decode(
+        self, codes: np.ndarray, at: np.ndarray, here: np.ndarray, radiance: np.ndarray, clipped: np.ndarray
+    ) -> None:
+        """Fill `radiance` (n, P, 3) and `clipped` (n, P) at `here` from codes (n, all, 3) at `at`."""
+        if self._table is None:
+            radiance[:, here], clipped[:, here] = photograph(self.path, Raster(codes[:, at]), self.encoding)
+        else:
+            decode(codes, at, self._table, here, radiance, clipped)
+
+    @cached_property
+    def _table(self) -> np.ndarray | None:
+        """The light that each code stands for; None where samples are no codes."""
+        if self.codes.dtype not in (np.uint8, np.uint16):
+            return None
+        codes = np.arange(np.iinfo(self.codes.dtype).max + 1, dtype=self.codes.dtype)
+        return photograph(self.path, Raster(codes.reshape(1, -1, 1)), self.encoding).radiance[0, :, 0].copy()
 
     def parts(self, at: np.ndarray, most: int) -> Iterator[np.ndarray]:
         at = np.asarray(at)
@@ -172,7 +196,8 @@ def _begun(files: PhotographFiles, path: Path) -> zarr.Array[Any]:
             shape=(count, rows, columns, 3),
             dtype=first.dtype,
             chunks=(min(_GROUP, count), min(_TILE, rows), min(_TILE, columns), 3),
-            compressors=[ZstdCodec(level=1), Crc32cCodec()],
+            compressors=[ZstdCodec(level=-1), Crc32cCodec()],
+            config={"write_empty_chunks": True},  # else each is compared with zeros, which takes as long as packing it
             attributes={
                 "kind": "gonio photographs",
                 "version": 1,
