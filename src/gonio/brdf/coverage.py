@@ -53,7 +53,10 @@ class Coverage:
         cell = float(extent.max()) / 1024 or 1.0
         kept = samples
         while len(kept) > _MOST:
-            _, first = np.unique(((kept - low) / cell).astype(np.int64), axis=0, return_index=True)
+            at = ((kept - low) / cell).astype(np.int64)
+            # By one number for each cell: rows are sorted ten times as slowly.
+            number = np.ravel_multi_index(tuple(at.T), tuple(at.max(axis=0) + 1))
+            _, first = np.unique(number, return_index=True)
             kept, cell = kept[first], cell * 2**0.5
         drawn = samples[np.random.default_rng(seed).permutation(len(samples))[:_DRAWN]]
         away = cKDTree(kept).query(drawn)[0]
