@@ -88,6 +88,14 @@ def arriving(light: Light, positions: np.ndarray) -> Arriving:
     )
 
 
+def arriving_from(lights: Sequence[Light], positions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """What N lights send to `positions` (S, 3): directions and irradiances (N, S, 3), distances (N, S); S is 1 where
+    all are distant, since one point stands for all then."""
+    some = positions[:1] if all(light.distant for light in lights) else positions
+    direction, irradiance, distance = zip(*(arriving(light, some) for light in lights), strict=True)
+    return np.stack(direction), np.stack(irradiance), np.stack(distance)
+
+
 def scaled(light: Light, factor: Array) -> Light:
     """The light `factor`, a number or (3,), times as bright."""
     f = to_numpy(factor)

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import MEMORY_LIMIT, ArrayError, MemoryLimitError
-from .lighting import arriving
+from .lighting import arriving_from
 from .model import Capture
 from .photographs import Photograph, Photographs
 from .separation import Separated, by_colour, by_least_light, by_polarisers
@@ -125,15 +125,14 @@ def _parted(
     for part in capture.photographs.parts(at, _SITES):
         some = sites[part]
         seen = capture.observe_all(part)
-        direction, E, _ = zip(*(arriving(light, some.positions) for light in lights), strict=True)
-        E = np.stack([np.broadcast_to(x, (len(part), 3)) for x in E], axis=1)
-        cosines = np.stack([np.sum(x * some.frames[:, 2], axis=-1) for x in direction], axis=1)
-        whole = np.moveaxis(seen.known & (seen.radiance >= 0).all(axis=2), 0, 1) & (E > 0).all(axis=2)
-        values = np.where(whole[..., None], np.moveaxis(seen.radiance, 0, 1) / np.where(E > 0, E, 1), np.nan)
-        found = separate(values, np.clip(cosines, -1, 1))
-        known[:, part] = whole.T
+        direction, E, _ = arriving_from(lights, some.positions)
+        cosines = np.sum(direction * some.frames[:, 2], axis=-1)
+        whole = seen.known & (seen.radiance >= 0).all(axis=2) & (E > 0).all(axis=2)
+        values = np.where(whole[..., None], seen.radiance / np.where(E > 0, E, 1), np.nan)
+        found = separate(np.moveaxis(values, 0, 1), np.clip(cosines, -1, 1).T)
+        known[:, part] = whole
         for of, out in ((found.diffuse, diffuse), (found.specular, specular)):
-            out[:, part] = np.moveaxis(np.where(whole[..., None], of * E, 0), 0, 1)
+            out[:, part] = np.where(whole[..., None], np.moveaxis(of, 0, 1) * E, 0)
         done += len(part)
         if progress is not None:
             progress(done, len(sites))

@@ -23,7 +23,7 @@ from .._kernels import reflectance as kernels
 from ..errors import MEMORY_LIMIT, ArrayError, MemoryLimitError, ParameterError
 from ..frames import to_local
 from ..samples import RadianceSamples, ReflectanceSamples
-from .lighting import arriving
+from .lighting import arriving_from
 from .sites import Observation, Observing, Sites
 
 
@@ -114,10 +114,7 @@ class Reflectance:
     def _arriving(self, some: slice, sites: Sites) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Directions and irradiances (N, 1 or S, 3) of lights `some`, and their distances (N, 1 or S)."""
         assert self.capture.lights is not None
-        lights = self.capture.lights[some]
-        positions = sites.positions[:1] if all(light.distant for light in lights) else sites.positions
-        direction, irradiance, distance = zip(*(arriving(light, positions) for light in lights), strict=True)
-        return np.stack(direction), np.stack(irradiance), np.stack(distance)
+        return arriving_from(self.capture.lights[some], sites.positions)
 
     def _reflected(
         self, some: slice, sites: Sites, seen: Observation, floor: np.ndarray, dtype: type[np.floating]

@@ -265,15 +265,10 @@ def _relightable(path: Path) -> dict[str, Any]:
     import numpy as np
 
     import gonio as gn
-    from gonio.brdf.combine import Scaled, Sum
+    from gonio.brdf.combine import Scaled
     from gonio.brdf.radial import Radial
 
     thing = gn.read_relightable(path)
-    material = thing.material
-    terms = [
-        term.model if isinstance(term, Scaled) else term
-        for term in (material.terms if isinstance(material, Sum) else (material,))
-    ]
     facts: dict[str, Any] = {
         "kind": "shared material",
         "rows": thing.view.mask.shape[0],
@@ -281,7 +276,8 @@ def _relightable(path: Path) -> dict[str, Any]:
         "object": f"{thing.view.mask.mean():.1%} of the pixels",
         "shape": "unknown" if thing.shape is None else f"{len(thing.shape.faces)} faces",
     }
-    for k, term in enumerate(terms):
+    for k, lobe in enumerate(thing.material.lobes()):
+        term = lobe.model if isinstance(lobe, Scaled) else lobe
         assert isinstance(term, Radial)
         of = term.interpolant
         facts[f"term {k}"] = (

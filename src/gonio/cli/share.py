@@ -77,7 +77,7 @@ def share(
         shaped = _shaped(matte, kept)
         scene = dataclasses.replace(scene, normals=shaped.normals, mask=shaped.mask)
     options: dict[str, Any] = {
-        "regions": _regions(regions, scene.mask) if regions else None,
+        "regions": _regions(regions, scene.mask),
         "logarithm": not paper,
         "folded": not paper,
         "smooth": not paper,
@@ -86,8 +86,6 @@ def share(
     parts = _parts(scene, behind, separate, kept)
     with bar("centres") as progress:
         if parts is None:
-            if homogeneous and texture and options["regions"] is None:
-                options["regions"] = np.zeros(np.count_nonzero(scene.mask), int)
             found = gn.share_reflectance(
                 scene.select(kept).reflectance(least),
                 places,
@@ -173,13 +171,15 @@ def _parts(scene: Capture, behind: Capture | None, separate: str, kept: list[int
         return by(scene.select(kept), progress)
 
 
-def _regions(path: Path, mask: np.ndarray) -> np.ndarray:
-    """The region of each pixel of the mask, (sites,): pixels of the same colour are of one."""
+def _regions(path: Path | None, mask: np.ndarray) -> np.ndarray:
+    """The region of each pixel of the mask, (sites,): pixels of the same colour are of one, all without an image."""
     import numpy as np
 
     from gonio.errors import FileError
     from gonio.files.images import read_raster
 
+    if path is None:
+        return np.zeros(np.count_nonzero(mask), int)
     image = read_raster(path).samples
     if image.shape[:2] != mask.shape:
         raise FileError(f"{path} has {image.shape[:2]} pixels, the photographs {mask.shape}.")

@@ -9,12 +9,14 @@ Each kind has its own file beside this one (`shrm.py`).
 
 from __future__ import annotations
 
+import contextlib
 import io
 import json
 import math
 import os
 import zipfile
 import zlib
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -49,40 +51,36 @@ def read_archive(
 
     Raises `FileError` where the file is none, of another kind, newer, damaged, or its arrays exceed `memory_limit`.
     """
-    require_file(Path(path))
-    try:
-        with zipfile.ZipFile(path) as archive:
-            entries = {entry.filename: entry for entry in archive.infolist()}
-            fields = _manifest(path, archive)
-            _require_kind(path, fields, kind, version)
-            arrays, left = {}, memory_limit
-            for name, entry in entries.items():
-                if name.endswith(".npy"):
-                    arrays[name.removesuffix(".npy")] = array = _array(path, archive, entry, left)
-                    left -= array.nbytes
-    except FileError:
-        raise
-    except _DAMAGE as error:
-        raise FileError(f"{path} is damaged, or no .gonio file ({error}). Fetch or write it again.") from error
+    with _opened(path) as (archive, entries, fields):
+        _require_kind(path, fields, kind, version)
+        arrays, left = {}, memory_limit
+        for name, entry in entries.items():
+            if name.endswith(".npy"):
+                arrays[name.removesuffix(".npy")] = array = _array(path, archive, entry, left)
+                left -= array.nbytes
     return fields, arrays
 
 
 def kind_of(path: str | os.PathLike[str]) -> str:
     """The kind of a .gonio file. Raises `FileError` where it is none."""
+    with _opened(path) as (_, _, fields):
+        return str(fields.get("gonio")) if isinstance(fields, dict) else ""
+
+
+@contextlib.contextmanager
+def _opened(path: str | os.PathLike[str]) -> Iterator[tuple[zipfile.ZipFile, dict[str, zipfile.ZipInfo], Any]]:
+    """The archive, its entries by name, and what its manifest says; damage met while it is read is a `FileError`."""
     require_file(Path(path))
     try:
         with zipfile.ZipFile(path) as archive:
-            fields = _manifest(path, archive)
+            entries = {entry.filename: entry for entry in archive.infolist()}
+            if _MANIFEST not in entries or entries[_MANIFEST].file_size > _LONGEST_MANIFEST:
+                raise FileError(f"{path} is no .gonio file: it has no {_MANIFEST}.")
+            yield archive, entries, json.loads(archive.read(_MANIFEST))
+    except FileError:
+        raise
     except _DAMAGE as error:
         raise FileError(f"{path} is damaged, or no .gonio file ({error}). Fetch or write it again.") from error
-    return str(fields.get("gonio")) if isinstance(fields, dict) else ""
-
-
-def _manifest(path: str | os.PathLike[str], archive: zipfile.ZipFile) -> Any:
-    entry = {entry.filename: entry for entry in archive.infolist()}.get(_MANIFEST)
-    if entry is None or entry.file_size > _LONGEST_MANIFEST:
-        raise FileError(f"{path} is no .gonio file: it has no {_MANIFEST}.")
-    return json.loads(archive.read(entry))
 
 
 def _require_kind(path: str | os.PathLike[str], fields: Any, kind: str, version: int) -> None:

@@ -113,18 +113,21 @@ def share_reflectance(
     Raises `ArrayError` where there are too few samples, of a region too, none is positive, or places or regions do not
     fit the sites.
     """
-    table = collected(samples, places, seed)
-    if gray:
-        table = dataclasses.replace(table, value=table.value.mean(axis=1, keepdims=True))
-    labels = _labels(table, places, regions)
-    if texture and labels is None:
+    apart = places is not None or regions is not None
+    if texture and not apart:
         raise ParameterError(
             "texture gives each site its own colour: places are wanted, to tell the sites apart, or regions."
         )
-    albedo = albedo_of(table, len(labels)) if texture and labels is not None else None
-    of = np.zeros(len(table), np.intp) if labels is None else labels[table.site]
+    table = collected(samples, places, seed)
+    if gray:
+        table = dataclasses.replace(table, value=table.value.mean(axis=1, keepdims=True))
+    if not apart:
+        table = dataclasses.replace(table, site=np.zeros(len(table), np.intp))
+    labels = _labels(table, places, regions)
+    albedo = albedo_of(table, len(labels)) if texture else None
+    of = labels[table.site]
     names, sizes = np.unique(of, return_counts=True)
-    if labels is not None and len(alone := np.setdiff1d(labels, names)):
+    if len(alone := np.setdiff1d(labels, names)):
         raise ArrayError(f"region {alone[0]} has no sample. Give its sites to another, or take them out of the mask.")
     how = _How(logarithm, folded, smooth, rule or Lookahead(), error, seed)
     regional: dict[int, Radial] = {}
@@ -152,21 +155,21 @@ def share_reflectance(
         ends.append((found.converged, found.reason))
         regional[int(names[k])] = model
     assert scales is not None
-    seen = np.zeros(1 if labels is None else len(labels), bool)
-    seen[0 if labels is None else table.site] = True
+    seen = np.zeros(len(labels), bool)
+    seen[table.site] = True
     residual = math.sqrt(squares / float(np.sum((table.wi[:, 2:] * table.value) ** 2)))
     converged, reason = min(ends, key=lambda end: end[0])  # the first that did not converge tells why
     material = _over_sites(regional, labels, albedo, places)
     return Fit(Shared(material, scales, seen), residual, converged, reason, tuple(history))
 
 
-def _labels(table: Table, places: Array | None, regions: Array | None) -> np.ndarray | None:
-    """The region of each site (S,); None where sites are not told apart."""
-    if regions is None:
-        return None if places is None else np.zeros(len(to_numpy(places)), np.intp)
-    labels = np.asarray(to_numpy(regions))
+def _labels(table: Table, places: Array | None, regions: Array | None) -> np.ndarray:
+    """The region of each site (S,), 0 where they are not told."""
     wanted = table.site.max() + 1 if places is None else len(to_numpy(places))
-    if labels.ndim != 1 or labels.dtype.kind not in "iu" or not (len(labels) == wanted or places is None):
+    if regions is None:
+        return np.zeros(wanted, np.intp)
+    labels = np.asarray(to_numpy(regions))
+    if labels.ndim != 1 or labels.dtype.kind not in "iu" or (places is not None and len(labels) != wanted):
         raise ArrayError(f"regions are {labels.dtype} {labels.shape}; a whole number for each of {wanted} sites.")
     if len(labels) < wanted:
         raise ArrayError(f"regions are of {len(labels)} sites; samples are of {wanted} or more.")
@@ -217,7 +220,7 @@ def _shared(
 
 
 def _over_sites(
-    regional: dict[int, Radial], labels: np.ndarray | None, albedo: np.ndarray | None, places: Array | None
+    regional: dict[int, Radial], labels: np.ndarray, albedo: np.ndarray | None, places: Array | None
 ) -> BRDF:
     """The models of regions at all sites: one, times its colours; or their sum, each 0 outside its own."""
     if places is not None:
@@ -227,8 +230,7 @@ def _over_sites(
         (model,) = regional.values()
         return model if albedo is None else Scaled(model, albedo)
     colour = 1.0 if albedo is None else albedo
-    own = {name: (np.asarray(labels) == name)[:, None] for name in regional}
-    return Sum(tuple(Scaled(model, colour * own[name]) for name, model in regional.items()))
+    return Sum(tuple(Scaled(model, colour * (labels == name)[:, None]) for name, model in regional.items()))
 
 
 def _bright(radiance: np.ndarray) -> np.ndarray:

@@ -54,6 +54,7 @@ def lobes_picture(path: str | Path, thing: Relightable, pixels: Sequence[tuple[i
     known = shown[np.isfinite(shown)]
     bounds = np.quantile(known, (0.02, 0.995)) if known.size else (-1.0, 1.0)
     theta_h = np.radians(np.linspace(0.2, 80, 160))
+    curves = [_seen(material, len(pixels), theta_h, math.radians(theta_d), np.pi / 2) for theta_d in _DIFFERENCES]
     for k, colour in enumerate(_COLOURS[: len(pixels)]):
         axes = figure.add_subplot(grid[0, k + 1], projection="polar")
         drawn = axes.pcolormesh(phi, np.degrees(theta), shown[k], vmin=bounds[0], vmax=bounds[1], cmap="viridis")
@@ -63,18 +64,10 @@ def lobes_picture(path: str | Path, thing: Relightable, pixels: Sequence[tuple[i
         axes.spines[:].set_color(colour)
         axes.set_title(f"pixel {pixels[k][0]}, {pixels[k][1]}", color=colour, fontsize=9)
         axes = figure.add_subplot(grid[1, k + 1])
-        for theta_d, shade in zip(_DIFFERENCES, (1.0, 0.65, 0.4), strict=True):
-            f, trusted = (x[k] for x in _seen(material, len(pixels), theta_h, math.radians(theta_d), np.pi / 2))
-            sure = trusted > _TRUSTED
-            axes.semilogy(np.degrees(theta_h), np.where(sure, np.nan, f), ":", color=colour, alpha=shade)
-            axes.semilogy(
-                np.degrees(theta_h),
-                np.where(sure, f, np.nan),
-                color=colour,
-                alpha=shade,
-                linewidth=1.6,
-                label=f"{theta_d:g}",
-            )
+        for theta_d, shade, (f, trusted) in zip(_DIFFERENCES, (1.0, 0.65, 0.4), curves, strict=True):
+            x, sure, look = np.degrees(theta_h), trusted[k] > _TRUSTED, {"color": colour, "alpha": shade}
+            axes.semilogy(x, np.where(sure, np.nan, f[k]), ":", **look)
+            axes.semilogy(x, np.where(sure, f[k], np.nan), linewidth=1.6, label=f"{theta_d:g}", **look)
         axes.set_ylim(10 ** (bounds[0] - 0.3), 10 ** (bounds[1] + 0.3))
         axes.set_xlabel("theta_h, degrees", color=INK, fontsize=8)
         axes.tick_params(which="both", colors=INK, labelsize=7)
