@@ -77,6 +77,8 @@ from .files.merl import write_merl as write_merl
 from .files.merl_fits import read_merl_fits as read_merl_fits
 from .files.meshes import read_mesh as read_mesh
 from .files.meshes import write_mesh as write_mesh
+from .files.precomputed import read_precomputed as read_precomputed
+from .files.precomputed import write_precomputed as write_precomputed
 from .files.relightable import read_relightable as read_relightable
 from .files.relightable import write_relightable as write_relightable
 from .files.rgl import read_rgl as read_rgl
@@ -121,6 +123,9 @@ from .rendering.irradiance import irradiance_coefficients as irradiance_coeffici
 from .rendering.irradiance import irradiance_error as irradiance_error
 from .rendering.irradiance import irradiance_map as irradiance_map
 from .rendering.irradiance import irradiance_matrix as irradiance_matrix
+from .rendering.precomputed import Cells as Cells
+from .rendering.precomputed import Precomputed as Precomputed
+from .rendering.precomputing import precompute as precompute
 from .rendering.prefiltered import render_prefiltered as render_prefiltered
 from .rendering.reflection_map import reflection_map as reflection_map
 from .rendering.relight import Relightable as Relightable

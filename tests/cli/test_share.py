@@ -9,7 +9,7 @@ import pytest
 import gonio as gn
 from gonio.capture.photographs import Held
 from gonio.cli import main
-from gonio.cli.share import _places
+from gonio.cli.share import Places, _coordinates
 from gonio.viewer.sharing import sharing_picture
 
 BRDF = ("--brdf", "lambert:albedo=.5/.4/.3", "--brdf", "ggx:alpha=.4,eta=1.5")
@@ -147,6 +147,57 @@ def test_what_was_shared_is_rendered_under_other_light(capsys, tmp_path, thing):
     assert gn.read_image(tmp_path / "image.png", encoding="srgb").max() > 0.1
 
 
+def test_what_was_shared_is_seen_from_elsewhere(capsys, tmp_path, folder, thing):
+    seen, image = gn.read_relightable(thing), tmp_path / "image.exr"
+    look = ("--sun", "0,0,1:3", "--size", "32", "--supersample", "1", "--no-background")
+    low, high = seen.surface.bounds
+    radius = np.linalg.norm(seen.surface.vertices - (low + high) / 2, axis=1).max()
+    # From far above, with the lens that shows what the capture's camera did.
+    half = 16 * gn.read_capture(folder).camera.pixel
+    lens = ("--eye", "0,0,300", "--fov", 2 * np.degrees(np.arctan(half / (300 * radius))))
+    code, _, err = run(capsys, "render", thing, "-o", image, *lens, *look)
+    assert code == 0, err
+    before, after = gn.relight(seen, gn.Directional([0, 0, 1], 3.0)), gn.read_image(image)
+    inner = seen.view.mask & (seen.view.normal[..., 2] > 0.6)
+    # 300 radii off, rays at the rim lean by a third of a per cent.
+    np.testing.assert_allclose(after[inner], before[inner], rtol=0.02)
+    trust = tmp_path / "trust.exr"
+    aside = ("--eye", "1,0,3", "--shadows", "--confidence", trust)
+    code, _, err = run(capsys, "render", thing, "-o", image, *aside, *look)
+    assert code == 0, err
+    known = gn.read_image(trust)[..., 0]
+    assert 0.5 < np.median(known[known > 0]) <= 1
+    code, _, err = run(capsys, "render", thing, "-o", image, "--shadows")
+    assert code == 2 and "--shadows wants an --eye" in err
+
+
+def test_what_was_precomputed_is_rendered_and_told(capsys, tmp_path, thing):
+    fast, image = tmp_path / "fast.gonio", tmp_path / "image.exr"
+    code, _, err = run(capsys, "precompute", thing, "-o", fast, "--side", "4", "--samples", "1", "--error", ".05")
+    assert code == 0, err
+    code, out, err = run(capsys, "render", fast, "-o", image, "--sun", "0,.3,1")
+    assert (code, out) == (0, f"{image}\n"), err
+    expected = gn.read_precomputed(fast).relight(gn.Directional(gn.normalise([0, 0.3, 1.0])))
+    np.testing.assert_allclose(gn.read_image(image), expected, rtol=1e-3, atol=1e-6)
+    code, out, _ = run(capsys, "info", fast, "--json")
+    assert json.loads(out)["kind"] == "precomputed view" and json.loads(out)["cells of light"] == 96
+    code, _, err = run(capsys, "render", fast, "-o", image, "--eye", "0,0,4")
+    assert code == 2 and "images of one view" in err
+
+
+def test_places_along_the_surface_are_nearer_to_its_distances(capsys, tmp_path, folder):
+    off = {}
+    for places in ("image", "geodesic"):
+        arguments = ("--places", places, "--leave", 4, "--centres", 100, "--scales", ".2,.5,.01", "--json")
+        code, out, err = run(capsys, "share", folder, "-o", tmp_path / "thing.gonio", *arguments)
+        assert code == 0, err
+        facts = json.loads(out)
+        off[places] = facts["distortion of places"]
+        assert facts["error of photo4.png"] < 0.02
+    # An image of a hemisphere shortens its rim to nothing.
+    assert off["geodesic"] < 0.7 * off["image"]
+
+
 def test_how_far_to_trust_what_is_rendered_is_drawn(capsys, tmp_path, thing):
     image, trust = tmp_path / "image.exr", tmp_path / "trust.exr"
     found = []
@@ -266,7 +317,8 @@ def test_places_lie_in_the_image_whichever_way_the_camera_looks():
     wall = gn.Mesh(np.stack((x, 0 * x, z), axis=1), np.array([[0, 1, 2], [0, 2, 3]]))
     camera = gn.Pinhole.look_at((0, -4, 0.5), (0, 0, 0.5), 40, (12, 16))
     capture = gn.Capture(Held(np.ones((1, 12, 16, 3))), shape=wall, camera=camera)
-    places, (row, column) = _places(capture), np.nonzero(capture.mask)
+    (places, off), (row, column) = _coordinates(capture, capture.positions, Places.IMAGE), np.nonzero(capture.mask)
+    assert off < 1e-6  # a wall seen from straight before it
     assert places.min(axis=0).tolist() == [0, 0] and places.max() == 1
     # x to the right and y down, by one step a pixel.
     step = 1 / np.ptp(column)

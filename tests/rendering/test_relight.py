@@ -67,6 +67,22 @@ def test_progress_hears_of_all_pixels_and_parts_make_no_seams(capture, monkeypat
     assert heard[-1] == (count, count) and [n for n, _ in heard] == [*range(100, count, 100), count]
 
 
+def test_what_was_seen_is_a_surface_that_looks_the_same_from_elsewhere():
+    sphere = gn.Sphere()
+    thing = gn.Relightable(sphere.view(from_above(sphere, 96)), PLASTIC)
+    assert_allclose(thing.axes, np.eye(3), atol=1e-3)  # an image's x, y, and the eye above
+    camera = gn.Pinhole.look_at(4 * thing.axes.T @ [0.5, 0.2, 0.8], (0, 0, 0), 34, (48, 48))
+    found, truth = (gn.render(shape, PLASTIC, LIGHTS[1], camera) for shape in (thing.surface, sphere))
+    view = sphere.view(camera)
+    seen = view.mask & (view.position[..., 2] > 0.4)
+    # Triangles a fiftieth of the radius wide lie a hundredth of that below the sphere.
+    assert np.sqrt(np.mean((found - truth)[seen] ** 2) / np.mean(truth[seen] ** 2)) < 0.01
+    hidden = view.mask & (view.position[..., 2] < -0.1)
+    assert not found[hidden].any() and truth[hidden].any()
+    known = gn.Relightable(thing.view, PLASTIC, gn.vase(24))
+    assert known.surface is known.shape
+
+
 def test_what_cannot_be_relit_is_refused(capture):
     nothing = dataclasses.replace(capture.view, mask=np.zeros_like(capture.mask))
     with pytest.raises(gn.errors.ArrayError, match="some seen"):

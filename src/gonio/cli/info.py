@@ -258,7 +258,7 @@ def _mesh(path: Path) -> dict[str, Any]:
 def _gonio(path: Path) -> dict[str, Any]:
     from gonio.files.archive import kind_of
 
-    return _relightable(path) if kind_of(path) == "relightable" else _shrm(path)
+    return {"relightable": _relightable, "precomputed": _precomputed}.get(kind_of(path), _shrm)(path)
 
 
 def _relightable(path: Path) -> dict[str, Any]:
@@ -286,6 +286,22 @@ def _relightable(path: Path) -> dict[str, Any]:
         )
         facts[f"scales of term {k}"] = np.asarray(of.scales).tolist()
     return facts
+
+
+def _precomputed(path: Path) -> dict[str, Any]:
+    import gonio as gn
+
+    held = gn.read_precomputed(path)
+    return {
+        "kind": "precomputed view",
+        "made": held.made,
+        "rows": held.mask.shape[0],
+        "columns": held.mask.shape[1],
+        "error": held.error,
+        "cells of light": len(held.cells),
+        "lights": held.lights.shape[1],
+        "images of a block": float(held.ranks.mean()),
+    }
 
 
 def _shrm(path: Path) -> dict[str, Any]:

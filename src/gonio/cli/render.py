@@ -1,4 +1,4 @@
-"""`gonio render`: a sphere, mesh or height field with any BRDF under any light, to EXR or tone-mapped PNG."""
+"""`gonio render`: a shape with any BRDF, or what gonio fitted, under any light, to EXR or tone-mapped PNG."""
 
 from __future__ import annotations
 
@@ -14,7 +14,12 @@ from .info import MESHES
 from .progress import bar
 
 if TYPE_CHECKING:
+    import numpy as np
+
+    from ..cameras import Pinhole
     from ..lights.model import Light
+    from ..rendering.precomputed import Precomputed
+    from ..rendering.relight import Relightable
 
 
 class Curve(enum.StrEnum):
@@ -26,7 +31,7 @@ class Curve(enum.StrEnum):
 
 
 def render(
-    thing: Path | None = typer.Argument(None, help="A .gonio of gonio share: seen as it was photographed, relit."),
+    thing: Path | None = typer.Argument(None, help="A .gonio of gonio share or precompute, relit."),
     output: Path = typer.Option(..., "--output", "-o", help="image.exr (linear), or image.png (tone-mapped)."),
     brdf: list[str] = typer.Option(
         ["lambert:albedo=.6"],
@@ -48,7 +53,12 @@ def render(
     confidence: Path | None = typer.Option(
         None, "--confidence", help="Of a .gonio: also an image of how far to trust each pixel, 0 to 1."
     ),
-    eye: str = typer.Option("2.6,-3.2,1.6", "--eye", help="The camera's place x,y,z, z up, in radii of the shape."),
+    eye: str = typer.Option(
+        "",
+        "--eye",
+        help="The camera's place x,y,z, z up, in radii of the shape: else 2.6,-3.2,1.6. Of a .gonio right,up,towards "
+        "as it was photographed.",
+    ),
     field_of_view: float = typer.Option(34.0, "--fov", help="Vertical field of view in degrees."),
     supersample: int = typer.Option(2, "--supersample", help="Rays a pixel along each side."),
     background: bool = typer.Option(True, "--background/--no-background", help="Show the environment behind."),
@@ -64,35 +74,32 @@ def render(
     for path in (output, confidence):
         if path:
             require_writable(path)
-    if confidence and not thing:
-        raise ParameterError("--confidence is of what was fitted: it goes with a .gonio of gonio share.")
+    columns, rows = parse.size(size)
+    lens: dict[str, Any] = {"field_of_view": field_of_view, "size": (rows, columns)}
+    how: dict[str, Any] = {"shadows": shadows, "samples": samples, "supersample": supersample, "background": background}
     if thing:
-        if shape != "sphere" or maps_file or compare or shadows:
-            raise ParameterError(
-                f"{thing} is relit as it was photographed: --shape, --maps, --compare and --shadows go without."
-            )
-        seen, room = gn.read_relightable(thing), _light(light, layout, orientation, sun)
-        with bar("render") as progress:
-            image = gn.relight(seen, room, samples, progress)
+        if shape != "sphere" or maps_file or compare:
+            raise ParameterError(f"{thing} has a shape of its own: --shape, --maps and --compare go without.")
+        held = _held(thing, eye, shadows, confidence is not None)
+        lit = _light(light, layout, orientation, sun)
+        image, trusted = _relit(held, lit, eye, lens, how, confidence is not None)
         write(output, image, exposure, curve)
         typer.echo(str(output))
         if confidence:
-            with bar("confidence") as progress:
-                trust = gn.relit_confidence(seen, room, progress=progress)
-            gn.write_image(confidence, trust)
+            gn.write_image(confidence, trusted)
             typer.echo(str(confidence))
         return
-    columns, rows = parse.size(size)
+    if confidence:
+        raise ParameterError("--confidence is of what was fitted: it goes with a .gonio of gonio share.")
     material = parse.reflectance(brdf)
     arriving = None if maps_file and not light and not sun and not compare else _light(light, layout, orientation, sun)
     scene, centre, radius = shape_of(shape, relief, smooth, y_up)
-    towards = parse.vector(eye)
+    towards = parse.vector(eye or "2.6,-3.2,1.6")
     camera = gn.Pinhole.look_at(
         eye=[c + radius * e for c, e in zip(centre, towards, strict=True)],
         target=centre,
-        field_of_view=field_of_view,
-        size=(rows, columns),
         up=(0, 0, 1) if any(towards[:2]) else (0, 1, 0),  # from straight above, as a map lies
+        **lens,
     )
     quick = None
     if maps_file or compare:
@@ -102,21 +109,68 @@ def render(
     else:
         assert arriving is not None
         with bar("render") as progress:
-            image = gn.render(
-                scene,
-                material,
-                arriving,
-                camera,
-                shadows=shadows,
-                samples=samples,
-                supersample=supersample,
-                background=background,
-                progress=progress,
-            )
+            image = gn.render(scene, material, arriving, camera, progress=progress, **how)
         if quick is not None:
             image = _beside(quick, image)
     write(output, image, exposure, curve)
     typer.echo(str(output))
+
+
+def _held(path: Path, eye: str, shadows: bool, confidence: bool) -> Relightable | Precomputed:
+    """What a .gonio holds, if it can be shown as it is asked for."""
+    import gonio as gn
+    from gonio.errors import ParameterError
+    from gonio.files.archive import kind_of
+
+    if kind_of(path) == "precomputed":
+        if eye or shadows or confidence:
+            raise ParameterError(f"{path} holds images of one view: --eye, --shadows and --confidence go without.")
+        return gn.read_precomputed(path)
+    if shadows and not eye:
+        raise ParameterError(f"{path} is relit as it was photographed: --shadows wants an --eye, as 0,0,4.")
+    return gn.read_relightable(path)
+
+
+def _relit(
+    held: Relightable | Precomputed,
+    light: Light,
+    eye: str,
+    lens: dict[str, Any],
+    how: dict[str, Any],
+    with_confidence: bool,
+) -> tuple[np.ndarray, np.ndarray | None]:
+    """The image, as it was photographed or from another `eye`, and how far to trust it where that is asked."""
+    import gonio as gn
+
+    if isinstance(held, gn.Precomputed):
+        return held.relight(light), None
+    with bar("render") as progress:
+        if eye:
+            camera = _around(held, eye, lens)
+            image = gn.render(held.surface, held.material, light, camera, progress=progress, **how)
+            held = gn.Relightable(held.surface.view(camera), held.material)
+        else:
+            image = gn.relight(held, light, how["samples"], progress)
+    if not with_confidence:
+        return image, None
+    with bar("confidence") as progress:
+        return image, gn.relit_confidence(held, light, progress=progress)
+
+
+def _around(seen: Relightable, eye: str, lens: dict[str, Any]) -> Pinhole:
+    """The camera at `eye`, right,up,towards of the photograph, in radii of what was seen."""
+    import numpy as np
+
+    import gonio as gn
+
+    low, high = seen.surface.bounds
+    centre = (low + high) / 2
+    radius = np.linalg.norm(seen.surface.vertices - centre, axis=-1).max()
+    _, up, towards = seen.axes
+    place = np.array(parse.vector(eye))
+    return gn.Pinhole.look_at(
+        eye=centre + radius * place @ seen.axes, target=centre, up=up if np.any(place[[0, 2]]) else -towards, **lens
+    )
 
 
 def _by_maps(

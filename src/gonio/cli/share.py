@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import enum
 import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,6 +24,13 @@ if TYPE_CHECKING:
 _MOST_REGIONS = 64
 
 
+class Places(enum.StrEnum):
+    """Coordinates of pixels by name."""
+
+    IMAGE = "image"
+    GEODESIC = "geodesic"
+
+
 def share(
     capture: Path = captures.FOLDER,
     output: Path = typer.Option(..., "--output", "-o", help="thing.gonio, which gonio render relights."),
@@ -32,6 +40,9 @@ def share(
     ),
     leave: str = typer.Option("", "--leave", help="Photographs to leave out and predict: 0,5,9."),
     homogeneous: bool = typer.Option(False, "--homogeneous", help="One BRDF everywhere."),
+    places: Places = typer.Option(
+        Places.IMAGE, "--places", help="Pixels' coordinates: in the image's plane, or in lengths along the surface."
+    ),
     texture: bool = typer.Option(False, "--texture", help="A colour for each pixel, times what is shared."),
     regions: Path | None = typer.Option(
         None, "--regions", help="An image with a colour for each region: they share nothing with each other."
@@ -82,13 +93,17 @@ def share(
         "folded": not paper,
         "smooth": not paper,
     }
-    places = None if homogeneous else _places(scene)
+    facts: dict[str, Any] = {"photographs": len(kept)}
+    surface = _surface(scene)
+    coordinates = None
+    if not homogeneous:
+        coordinates, facts["distortion of places"] = _coordinates(scene, surface, places)
     parts = _parts(scene, behind, separate, kept)
     with bar("centres") as progress:
         if parts is None:
             found = gn.share_reflectance(
                 scene.select(kept).reflectance(least),
-                places,
+                coordinates,
                 centres=centres,
                 error=error,
                 scales=given,
@@ -98,12 +113,12 @@ def share(
             )
             material, fits = found.value.material, {"": found}
         else:
-            assert places is not None
+            assert coordinates is not None
             d, g = (part.reflectance(least) for part in parts)
             both = gn.share_dichromatic(
                 d,
                 g,
-                places,
+                coordinates,
                 centres=centres,
                 specular_centres=specular_centres,
                 scales=(given, given),
@@ -111,10 +126,12 @@ def share(
                 **options,
             )
             material, fits = both.material, {" of the body": both.diffuse, " of the surface": both.specular}
-    thing = Relightable(scene.view, scene.textures(material))
+    view = scene.view
+    if scene.shape is None:
+        view = dataclasses.replace(view, position=surface, lifted=surface)
+    thing = Relightable(view, scene.textures(material))
     ended = "; ".join(fit.reason for fit in fits.values())
     write_relightable(output, thing, f"gonio share {capture.name}: {len(kept)} photographs, {ended}")
-    facts: dict[str, Any] = {"photographs": len(kept)}
     for name, fit in fits.items():
         facts[f"centres{name}"] = fit.history[-1][0] if fit.history else 0
         facts[f"residual{name}"] = fit.residual
@@ -221,12 +238,36 @@ def _shaped(scene: Capture, kept: list[int]) -> Capture:
     return dataclasses.replace(scene, normals=np.where(found[..., None], relief.normals, 0), mask=found)
 
 
-def _places(scene: Capture) -> np.ndarray:
-    """Where sites lie in the image's plane, the longer side of the object from 0 to 1 (RS 7)."""
-    at = scene.sites.positions @ scene.camera.pose[:3, :2]
+def _surface(scene: Capture) -> np.ndarray:
+    """Where pixels lie (rows, columns, 3), as far as the camera lets their normals tell."""
+    from gonio.capture.surface import surface_positions
+    from gonio.errors import ParameterError
+
+    try:
+        return surface_positions(scene)
+    except ParameterError as error:
+        typer.echo(f"the surface is taken for a plane: {error}", err=True)
+        return scene.positions
+
+
+def _coordinates(scene: Capture, surface: np.ndarray, places: Places) -> tuple[np.ndarray, float]:
+    """Coordinates (S, 2) of the sites, the longer side of the object from 0 to 1 (RS 7), and their distortion."""
+
+    from gonio.shapes.flattening import distortion
+    from gonio.shapes.pixels import pixel_mesh
+    from gonio.shapes.places import MOST, surface_places
+
+    if places is Places.GEODESIC:
+        at, flat = surface_places(surface, scene.mask)
+        off = flat.distortion
+    else:
+        axes = scene.camera.pose[:3, :2]
+        at = scene.sites.positions @ axes
+        mesh = pixel_mesh(surface, scene.mask, most=MOST)
+        off = distortion(mesh, mesh.vertices @ axes, welded=False)
     low, high = at.min(axis=0), at.max(axis=0)
-    places: np.ndarray = (at - low) / max(float((high - low).max()), 1e-30)
-    return places
+    scaled: np.ndarray = (at - low) / max(float((high - low).max()), 1e-30)
+    return scaled, off
 
 
 def _scales(text: str) -> Scales | None:

@@ -3,23 +3,28 @@
     B(x) = sum_k f(x, wi_k, wo) E_k max(n.wi_k, 0)          at the pixels of a view
     the same, each f times its confidence, over B           how far to trust it
 
-Not here: shadows that the shape casts, and other places of the eye (`render`, with a shape).
+Not here: shadows that the shape casts, and other places of the eye: `render` with `surface`, which is what is known of
+the shape from where it was seen.
 """
 
 from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from ..arrays import Array, to_numpy
 from ..brdf.model import BRDF
+from ..directions import normalise
 from ..errors import ArrayError
+from ..frames import frame
 from ..lights.model import Light
 from ..reflection import radiance, textured
 from ..shapes.mesh import Mesh
+from ..shapes.pixels import pixel_mesh
 from ..shapes.view import View
 from .image import FEWEST, MOST, beams_wanted
 
@@ -37,6 +42,22 @@ class Relightable:
     def __post_init__(self) -> None:
         if self.view.mask.ndim != 2 or not self.view.mask.any():
             raise ArrayError(f"view has a mask of shape {self.view.mask.shape}; pixels (rows, columns), some seen.")
+
+    @cached_property
+    def surface(self) -> Mesh:
+        """`shape`, and where that is unknown the mesh of the pixels, with the same uv; leaps in depth are cut."""
+        if self.shape is not None:
+            return self.shape
+        return pixel_mesh(self.view.position, self.view.mask, self.view.normal)
+
+    @cached_property
+    def axes(self) -> np.ndarray:
+        """Rows (3, 3), unit, world: right, up and towards the eye, as the picture of the view has them."""
+        mask = self.view.mask
+        pixels = np.argwhere(mask)
+        slopes = np.linalg.lstsq(pixels - pixels.mean(axis=0), self.view.position[mask], rcond=None)[0]
+        towards = normalise(self.view.wo[mask].mean(axis=0), "the mean of wo")
+        return np.asarray(frame(towards, slopes[1]))
 
 
 def relight(
