@@ -2,6 +2,7 @@
 
 import json
 import shutil
+import signal
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ import gonio as gn
 from gonio.capture.photographs import Held
 from gonio.cli import main
 from gonio.cli.share import Places, _coordinates
+from gonio.fitting import centres
 from gonio.viewer.sharing import sharing_picture
 
 BRDF = ("--brdf", "lambert:albedo=.5/.4/.3", "--brdf", "ggx:alpha=.4,eta=1.5")
@@ -171,6 +173,33 @@ def test_what_was_shared_is_seen_from_elsewhere(capsys, tmp_path, folder, thing)
     assert code == 2 and "--shadows wants an --eye" in err
 
 
+def test_ctrl_c_keeps_the_centres_there_are_and_the_fit_goes_on(capsys, tmp_path, folder, thing, monkeypatch):
+    part, whole = tmp_path / "part.gonio", tmp_path / "whole.gonio"
+    told = []
+
+    def press(self, indices):
+        if len(self.chosen) > 60 and not told:
+            told.append(len(self.chosen))
+            signal.raise_signal(signal.SIGINT)
+        return take(self, indices)
+
+    take = centres._Rounds._take
+    monkeypatch.setattr(centres._Rounds, "_take", press)
+    arguments = ("--leave", "4", "--centres", "200", "--json")
+    code, out, err = run(capsys, "share", folder, "-o", part, "--scales", ".2,.5", *arguments)
+    facts = json.loads(out)
+    assert code == 130
+    assert f"go on with --resume {part}" in err and "gonio: stopped" in err
+    assert 60 < facts["centres"] < 100 and "it was stopped with" in facts["ended"]
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    code, out, err = run(capsys, "share", folder, "-o", whole, "--resume", part, *arguments)
+    assert code == 0, err
+    ended, light = json.loads(out), gn.Directional(gn.normalise([0.4, 0.2, 1.0]))
+    assert (ended["centres"], ended["m_xy, m_w, rho"]) == (200, [0.2, 0.5, 0.0])
+    image, expected = (gn.relight(gn.read_relightable(path), light) for path in (whole, thing))
+    np.testing.assert_allclose(image, expected, rtol=1e-3, atol=1e-5)
+
+
 def test_what_was_precomputed_is_rendered_and_told(capsys, tmp_path, thing):
     fast, image = tmp_path / "fast.gonio", tmp_path / "image.exr"
     code, _, err = run(capsys, "precompute", thing, "-o", fast, "--side", "4", "--samples", "1", "--error", ".05")
@@ -274,6 +303,8 @@ def test_a_capture_without_normals_goes_through_photometric_stereo(capsys, tmp_p
         (("--separate", "colour", "--homogeneous"), "leave --separate and --crossed out"),
         (("--separate", "colour", "--crossed", "x"), "give one of them"),
         (("--crossed", "none"), "none"),
+        (("--separate", "colour", "--resume", "x.gonio"), "leave --separate and --crossed out"),
+        (("--resume", "none.gonio"), "none.gonio does not exist"),
         (("--centres", "4"), "centres"),
         (("--picture", "seen.jpg"), "end its name in .png"),
         (("--output", "thing.exr"), "end its name in .gonio"),

@@ -27,7 +27,9 @@ def view():
 def radial(rng, d, limits=None, channels=3, **options):
     """One with d coordinates, whose values lie near 0."""
     centres, coefficients = rng.random((20, d)), rng.normal(size=(20, channels)) / 50
-    interpolant = Interpolant(centres, rng.uniform(0.2, 1, d), coefficients, rng.normal(size=(d + 1, channels)), limits)
+    interpolant = Interpolant(
+        centres, rng.uniform(0.2, 1, d), coefficients, rng.normal(size=(d + 1, channels)), limits, 0.25
+    )
     return Radial(interpolant, **options)
 
 
@@ -62,6 +64,8 @@ def test_what_was_written_is_read(tmp_path, rng, view, case):
         np.testing.assert_allclose(getattr(read.view, name), getattr(view, name), atol=3e-7)
     assert read.shape is None
     assert json.loads(zipfile.ZipFile(tmp_path / "thing.gonio").read("gonio.json"))["made"] == "by hand"
+    models = [getattr(lobe, "model", lobe) for lobe in read.material.lobes()]
+    assert {model.interpolant.rho for model in models} == {0.25}
     image = relight(thing, SUN)
     assert image.max() > 0.1
     np.testing.assert_allclose(relight(read, SUN), image, rtol=1e-4, atol=1e-5)
@@ -130,6 +134,8 @@ def first(value):
         (with_fields(terms="radial"), "field 'terms'"),
         (with_fields(terms=[{"logarithm": True, "folded": 1, "flat": False}]), r"terms\[0\]"),
         (with_fields(terms=[{"logarithm": True, "folded": True, "flat": True}]), "5 coordinates"),
+        (with_fields(terms=[{"logarithm": True, "folded": True, "flat": False, "rho": "stiff"}]), "rho = 'stiff'"),
+        (with_fields(terms=[{"logarithm": True, "folded": True, "flat": False, "rho": -1}]), "rho = -1"),
         (with_fields(terms=[{"logarithm": True, "folded": True, "flat": False}] * 2), "term-1-centres.npy is missing"),
         (without("term-0-scales.npy"), "term-0-scales.npy is missing"),
         (without("term-0-y.npy"), "x and y are given both"),

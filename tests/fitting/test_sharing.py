@@ -325,12 +325,46 @@ def test_centres_are_added_until_the_error_is_reached_and_progress_hears(blocks)
     assert heard[-1] == (fit.history[-1][0], 300) and heard[-1][0] < 300
 
 
+def test_a_fit_that_was_stopped_goes_on_as_if_it_had_not_been(ball, blocks):
+    at, scales = places(ball), Scales(0.3, 0.5, 0.02)
+    labels = (at[:, 0] > np.median(at[:, 0])).astype(int)
+    heard = []
+    options = {"scales": scales, "centres": 150}
+    for how in ({}, {"texture": True}, {"regions": labels}):
+        whole = share_reflectance(blocks, at, **options, **how)
+        heard.clear()
+        part = share_reflectance(
+            blocks, at, **options, **how, progress=lambda done, _: heard.append(done), until=lambda: heard[-1] >= 40
+        )
+        assert not part.converged and "it was stopped with" in part.reason
+        assert 40 <= part.history[-1][0] < 100
+        rest = share_reflectance(blocks, at, centres=150, **how, start=part.value.material)
+        assert rest.value.scales == scales
+        wi, wo = blocks[0].wi[:1], blocks[0].wo[:1]
+        # A centre's places have been through the scales and back.
+        assert_allclose(rest.value.material.f(wi, wo), whole.value.material.f(wi, wo), rtol=1e-4, err_msg=str(how))
+
+
+def test_a_start_from_elsewhere_is_refused(ball, blocks):
+    start = share_reflectance(blocks, centres=20, scales=SCALES).value.material
+    with pytest.raises(gn.errors.ArrayError, match=r"centres of start are none of these samples"):
+        share_reflectance(blocks[4:], start=start)
+    with pytest.raises(gn.errors.ParameterError, match="3 coordinates, these samples have 5"):
+        share_reflectance(blocks, places(ball), start=start)
+    with pytest.raises(gn.errors.ParameterError, match="logarithm=False"):
+        share_reflectance(blocks, logarithm=False, start=start)
+    with pytest.raises(gn.errors.ParameterError, match="2 parts; one for each of 1"):
+        share_reflectance(blocks, start=start + start)
+    with pytest.raises(gn.errors.ParameterError, match="logarithm=True"):
+        share_reflectance(blocks, start=gn.Lambert(0.5))
+
+
 @pytest.mark.parametrize("rho", [0.03, 1.0])
 def test_least_squares_at_the_centres_alone_is_the_stiff_interpolant(rng, rho):
     q = rng.uniform(-1, 1, (80, 3)) + np.array([0, 30, 0])
     g = rng.normal(size=(80, 2))[:, [0, 1, 0]]
     stiff = choose_centres(q, g, None, np.array([1, 1, 0.5]), rho, most=80).interpolant
-    again = smoothed(stiff, q, g, np.full(80, 3.0), rho)
+    again = smoothed(stiff, q, g, np.full(80, 3.0))
     assert_allclose(again.coefficients, stiff.coefficients, atol=1e-6 * np.abs(stiff.coefficients).max())
     assert_allclose(again.polynomial, stiff.polynomial, atol=1e-6 * np.abs(stiff.polynomial).max())
 

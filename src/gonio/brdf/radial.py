@@ -43,6 +43,7 @@ class Interpolant:
 
     `polynomial` (d + 1, C) is the constant, then what multiplies M q. s is held within `limits` (2, C), the range of
     the data, so that beyond the centres it stays finite; None holds nothing. All are kept in double precision.
+    `rho` >= 0 is the stiffness that they were solved with (RS 10), for who goes on from there.
 
     Raises `ArrayError` where shapes do not fit or entries are not finite, `ParameterError` for scales that are not
     positive or limits that are crossed.
@@ -53,16 +54,17 @@ class Interpolant:
     coefficients: Array
     polynomial: Array
     limits: Array = None
+    rho: float = 0.0
 
     def __post_init__(self) -> None:
-        for field in dataclasses.fields(self):
-            value = getattr(self, field.name)
-            if field.name == "limits" and value is None:
+        for name in ("centres", "scales", "coefficients", "polynomial", "limits"):
+            value = getattr(self, name)
+            if name == "limits" and value is None:
                 continue
             array = np.array(to_numpy(value), dtype=np.float64)
-            require_finite(array, field.name)
+            require_finite(array, name)
             array.flags.writeable = False
-            object.__setattr__(self, field.name, array)
+            object.__setattr__(self, name, array)
         if self.centres.ndim != 2 or not 2 <= self.centres.shape[1] <= 6 or len(self.centres) == 0:
             raise ArrayError(f"centres has shape {self.centres.shape}; expected (N, d), d = 2 to 6.")
         if self.coefficients.ndim != 2 or self.coefficients.shape[1] not in (1, 3):
@@ -81,6 +83,8 @@ class Interpolant:
             raise ParameterError(f"Interpolant: a scale is {self.scales.min():.6g}; all are positive.")
         if self.limits is not None and np.any(self.limits[0] > self.limits[1]):
             raise ParameterError("Interpolant: the lower of the limits lies above the upper.")
+        if not 0 <= self.rho < math.inf:
+            raise ParameterError(f"Interpolant: rho = {self.rho!r} is not a number >= 0.")
 
     def __call__(self, q: Array) -> Array:
         """s at `q` (..., d) -> (..., C), in the library and dtype of `q`; NumPy's is evaluated in single precision.

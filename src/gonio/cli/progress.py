@@ -1,7 +1,8 @@
-"""A progress bar on stderr, with the time left: what the verbs pass as `progress(done, total)`."""
+"""What long work tells and is asked: a bar on stderr with the time left, and whether Ctrl-C wants what there is."""
 
 from __future__ import annotations
 
+import signal
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -25,3 +26,31 @@ def bar(label: str) -> Iterator[Callable[[int, int], None]]:
     with progress.Progress(*columns, console=stderr, disable=not sys.stderr.isatty(), transient=True) as shown:
         task = shown.add_task(label, total=None)
         yield lambda done, total: shown.update(task, completed=done, total=total)
+
+
+@contextmanager
+def stoppable(progress: Callable[[int, int], None]) -> Iterator[tuple[Callable[[int, int], None], Callable[[], bool]]]:
+    """`with stoppable(progress) as (heard, stopped): work(progress=heard, until=stopped)`.
+
+    Once the work was heard of, Ctrl-C asks it to end with what there is; a second one ends it at once, as the first
+    does before.
+    """
+    begun = asked = False
+
+    def heard(done: int, total: int) -> None:
+        nonlocal begun
+        begun = True
+        progress(done, total)
+
+    def interrupt(*_: object) -> None:
+        nonlocal asked
+        if asked or not begun:
+            raise KeyboardInterrupt
+        asked = True
+        print("gonio: stopping with what there is; once more ends at once", file=sys.stderr)
+
+    before = signal.signal(signal.SIGINT, interrupt)
+    try:
+        yield heard, lambda: asked
+    finally:
+        signal.signal(signal.SIGINT, before)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from . import captures, parse
-from .progress import bar
+from .progress import bar, stoppable
 
 if TYPE_CHECKING:
     import numpy as np
@@ -59,6 +59,9 @@ def share(
         False, "--paper", help="As the paper: interpolate f itself over v, not fit log f over |v|."
     ),
     least: float = typer.Option(0.0, "--least", help="Leave out what is darker than this part of a pixel's mean."),
+    resume: Path | None = typer.Option(
+        None, "--resume", help="Go on from a .gonio of these photographs and options, stopped or of fewer centres."
+    ),
     lights: Path | None = typer.Option(None, "--lights", help="An .lp to use instead: its lights in the same order."),
     encoding: str = captures.ENCODING,
     partial: bool = captures.PARTIAL,
@@ -76,8 +79,8 @@ def share(
     for path, suffix in ((output, ".gonio"), (picture, ".png")):
         if path:
             writable(path, suffix)
-    _require_one(separate, crossed, homogeneous)
-    given = _scales(scales)
+    _require_one(separate, crossed, homogeneous, resume)
+    given, earlier = _scales(scales), gn.read_relightable(resume).material if resume else None
     scene = captures.read(capture, encoding, partial, lights)
     left = _left_out(leave, len(scene.photographs))
     kept = [k for k in range(len(scene.photographs)) if k not in left]
@@ -87,19 +90,21 @@ def share(
         matte = scene if behind is None else gn.parts_by_polarisers(scene, behind).diffuse
         shaped = _shaped(matte, kept)
         scene = dataclasses.replace(scene, normals=shaped.normals, mask=shaped.mask)
-    options: dict[str, Any] = {
-        "regions": _regions(regions, scene.mask),
-        "logarithm": not paper,
-        "folded": not paper,
-        "smooth": not paper,
-    }
     facts: dict[str, Any] = {"photographs": len(kept)}
     surface = _surface(scene)
     coordinates = None
     if not homogeneous:
         coordinates, facts["distortion of places"] = _coordinates(scene, surface, places)
     parts = _parts(scene, behind, separate, kept)
-    with bar("centres") as progress:
+    with bar("centres") as heard, stoppable(heard) as (progress, stopped):
+        options: dict[str, Any] = {
+            "regions": _regions(regions, scene.mask),
+            "logarithm": not paper,
+            "folded": not paper,
+            "smooth": not paper,
+            "progress": progress,
+            "until": stopped,
+        }
         if parts is None:
             found = gn.share_reflectance(
                 scene.select(kept).reflectance(least),
@@ -108,7 +113,7 @@ def share(
                 error=error,
                 scales=given,
                 texture=texture,
-                progress=progress,
+                start=earlier,
                 **options,
             )
             material, fits = found.value.material, {"": found}
@@ -122,7 +127,6 @@ def share(
                 centres=centres,
                 specular_centres=specular_centres,
                 scales=(given, given),
-                progress=progress,
                 **options,
             )
             material, fits = both.material, {" of the body": both.diffuse, " of the surface": both.specular}
@@ -149,22 +153,29 @@ def share(
     if picture:
         from gonio.viewer.sharing import sharing_picture
 
-        shown = predictions or [predicted(k) for k in kept[:3]]
         names = [scene.photographs.names[k] for k in (left or kept[:3])]
+        shown = predictions or [predicted(k) for k in kept[:3]]
         sharing_picture(picture, names, shown, next(iter(fits.values())).history)
-    if as_json:
-        typer.echo(json.dumps(facts))
-    else:
-        for name, value in facts.items():
-            worded = " ".join(f"{x:.3g}" for x in value) if isinstance(value, list) else value
-            typer.echo(f"{name:>28}  {worded:.4g}" if isinstance(worded, float) else f"{name:>28}  {worded}")
-        typer.echo(str(output))
+    _say(facts, output, as_json)
+    if stopped():
+        typer.echo(f"go on with --resume {output}", err=True)
+        raise typer.Exit(130)
     if error and not all(fit.converged for fit in fits.values()):
         raise typer.Exit(1)
 
 
-def _require_one(separate: str, crossed: Path | None, homogeneous: bool) -> None:
-    """Refuse ways to tell body and surface apart that do not go together."""
+def _say(facts: dict[str, Any], output: Path, as_json: bool) -> None:
+    if as_json:
+        typer.echo(json.dumps(facts))
+        return
+    for name, value in facts.items():
+        worded = " ".join(f"{x:.3g}" for x in value) if isinstance(value, list) else value
+        typer.echo(f"{name:>28}  {worded:.4g}" if isinstance(worded, float) else f"{name:>28}  {worded}")
+    typer.echo(str(output))
+
+
+def _require_one(separate: str, crossed: Path | None, homogeneous: bool, resume: Path | None) -> None:
+    """Refuse ways to tell body and surface apart that do not go together, or cannot be gone on with."""
     from gonio.errors import ParameterError
 
     if separate not in ("", "colour", "least"):
@@ -173,6 +184,8 @@ def _require_one(separate: str, crossed: Path | None, homogeneous: bool) -> None
         raise ParameterError("--separate and --crossed both tell body and surface apart; give one of them.")
     if homogeneous and (separate or crossed):
         raise ParameterError("--homogeneous is one BRDF for body and surface: leave --separate and --crossed out.")
+    if resume and (separate or crossed):
+        raise ParameterError("--resume goes on with body and surface in one: leave --separate and --crossed out.")
 
 
 def _parts(scene: Capture, behind: Capture | None, separate: str, kept: list[int]) -> Parts | None:

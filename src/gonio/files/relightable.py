@@ -1,6 +1,6 @@
 """What reflectance sharing found of one view, in .gonio files (`archive.py`): kind "relightable".
 
-gonio.json      made; terms: [{logarithm, folded, flat, reach}, ...], the Radial models that add up
+gonio.json      made; terms: [{logarithm, folded, flat, rho, reach}, ...], the Radial models that add up
 term-K-NAME.npy centres (N, d), scales (d,), coefficients (N, C), polynomial (d + 1, C), limits (2, C), of term K;
                 samples (K, d), sample-scales (d,) where they are known, with reach: its coverage;
                 x, y (rows, columns) where it is spatial; factor (rows, columns, C) or (C,) where it is scaled
@@ -44,7 +44,7 @@ def write_relightable(path: str | os.PathLike[str], thing: Relightable, made: st
             term = term.model
         if not isinstance(term, Radial):
             raise FileError(f"{path}: a {type(term).__name__} is not written; Radial models are.")
-        terms.append({name: getattr(term, name) for name in _FLAGS})
+        terms.append({name: getattr(term, name) for name in _FLAGS} | {"rho": term.interpolant.rho})
         if term.coverage is not None:
             terms[-1]["reach"] = term.coverage.reach
             arrays[f"term-{k}-samples"] = to_numpy(term.coverage.points)
@@ -88,7 +88,10 @@ def _term(path: str | os.PathLike[str], k: int, term: Any, arrays: dict[str, np.
     if not isinstance(term, dict) or not all(isinstance(term.get(name), bool) for name in _FLAGS):
         raise FileError(f"{path}: terms[{k}] is {term!r:.80}; it has {', '.join(_FLAGS)}, each true or false.")
     own = {name: _array(path, arrays, f"term-{k}-{name}") for name in _INTERPOLANT}
-    interpolant = Interpolant(**own, limits=arrays.get(f"term-{k}-limits"))
+    rho = term.get("rho", 0.0)  # older files have none
+    if not isinstance(rho, float | int) or isinstance(rho, bool):
+        raise FileError(f"{path}: terms[{k}] has rho = {rho!r:.40}; a number is wanted.")
+    interpolant = Interpolant(**own, limits=arrays.get(f"term-{k}-limits"), rho=float(rho))
     coverage = None
     if (samples := arrays.get(f"term-{k}-samples")) is not None:
         reach = term.get("reach")

@@ -46,6 +46,7 @@ def share_dichromatic(
     rule: Rule | None = None,
     seed: int = 0,
     progress: Callable[[int, int], None] | None = None,
+    until: Callable[[], bool] | None = None,
 ) -> Dichromatic:
     """Both parts of the BRDF at S sites, from samples of either; the arguments are those of `share_reflectance`.
 
@@ -70,6 +71,7 @@ def share_dichromatic(
             rule=rule,
             seed=seed,
             progress=None if progress is None else lambda done, _: progress(before + done, total),
+            until=until,
         )
 
     body = shared(diffuse, centres, scales[0], 0, True)

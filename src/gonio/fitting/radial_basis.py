@@ -84,7 +84,8 @@ class RadialSystem:
         polynomial[1:] /= self._extent[:, None]
         polynomial[0] -= self._middle @ polynomial[1:]
         order = np.argsort(self._order, kind="stable")
-        return Interpolant(self.scaled_centres[order] / self.scales, self.scales, weights[order], polynomial, None)
+        centres = self.scaled_centres[order] / self.scales
+        return Interpolant(centres, self.scales, weights[order], polynomial, rho=self.rho)
 
     def candidates(self, points: Array, values: Array) -> Candidates:
         """Candidates (m, d) with values (m, C), and their residuals now and after each that is picked."""

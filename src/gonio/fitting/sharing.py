@@ -21,12 +21,13 @@ import math
 from collections.abc import Callable, Iterable
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ..arrays import Array, to_numpy
 from ..brdf.combine import Scaled, Sum
 from ..brdf.coverage import Coverage
 from ..brdf.model import BRDF
-from ..brdf.radial import Radial
+from ..brdf.radial import Interpolant, Radial
 from ..errors import ArrayError, ParameterError
 from ..samples import ReflectanceSamples
 from .albedo import DARKEST, albedo_of, ordinary
@@ -43,6 +44,7 @@ _ASTRAY = 0.7  # what w weighs where it is asked how far from samples a fit can 
 _STIFF = 0.03  # where nothing tells how noisy samples are
 _AGAIN = 2  # fits with weights by the one before
 _USUAL = 0.3  # log f that is off by less is no outlier
+_SAME = 1e-9  # as far apart, a centre is a sample: it went through its scales and back
 _LEAST_AND_MOST = 0.05, 4.0  # weights, of the median: no highlight is all there is, nor does any dark count for nothing
 
 
@@ -81,6 +83,7 @@ class _How:
     rule: Rule
     error: float
     seed: int
+    until: Callable[[], bool] | None
 
 
 def share_reflectance(
@@ -98,7 +101,9 @@ def share_reflectance(
     smooth: bool = True,
     rule: Rule | None = None,
     seed: int = 0,
+    start: BRDF | None = None,
     progress: Callable[[int, int], None] | None = None,
+    until: Callable[[], bool] | None = None,
 ) -> Fit[Shared]:
     """The BRDF at S sites from samples of a few photographs, a block of samples each.
 
@@ -107,11 +112,12 @@ def share_reflectance(
     centres: at most, divided among regions by their samples; fewer where the residual falls to `error`. scales: found
     by leaving photographs out where None, in the largest region. texture: give each site its own colour. gray: fit the
     mean of the channels. logarithm, folded, smooth: as above; without all three it is the paper's. rule: how centres
-    are chosen, `Lookahead()` where None. progress(done, total) hears of centres. The fit's history counts centres from
-    one region to the next.
+    are chosen, `Lookahead()` where None. start: the material of an earlier fit of these samples, which goes on from its
+    centres and scales as if it had not ended. progress(done, total) hears of centres; until() is asked between rounds
+    of them, and True ends the fit with those there are. The fit's history counts centres from one region to the next.
 
-    Raises `ArrayError` where there are too few samples, of a region too, none is positive, or places or regions do not
-    fit the sites.
+    Raises `ArrayError` where there are too few samples, of a region too, none is positive, places or regions do not
+    fit the sites, or centres of `start` are none of the samples; `ParameterError` where `start` was fitted otherwise.
     """
     apart = places is not None or regions is not None
     if texture and not apart:
@@ -129,11 +135,12 @@ def share_reflectance(
     names, sizes = np.unique(of, return_counts=True)
     if len(alone := np.setdiff1d(labels, names)):
         raise ArrayError(f"region {alone[0]} has no sample. Give its sites to another, or take them out of the mask.")
-    how = _How(logarithm, folded, smooth, rule or Lookahead(), error, seed)
+    how = _How(logarithm, folded, smooth, rule or Lookahead(), error, seed, until)
+    earlier = [None] * names.size if start is None else _earlier(start, names.size, how)
     regional: dict[int, Radial] = {}
     history: list[tuple[int, float]] = []
     ends, squares = [], 0.0
-    for k in np.argsort(-sizes, kind="stable"):
+    for k, first in zip(np.argsort(-sizes, kind="stable"), earlier, strict=True):
         own, before = table[of == names[k]], history[-1][0] if history else 0
         most = round(centres * sizes[k] / len(table))
 
@@ -142,7 +149,7 @@ def share_reflectance(
                 progress(before + done, centres)
 
         try:
-            model, found, scales = _shared(own, albedo, most, scales, how, hear)
+            model, found, scales = _shared(own, albedo, most, scales, first, how, hear)
         except (ArrayError, ParameterError) as bad:
             raise type(bad)(f"region {names[k]}: {bad}" if names.size > 1 else str(bad)) from bad
         d = model.f(own.wi, own.wo)
@@ -181,6 +188,7 @@ def _shared(
     albedo: np.ndarray | None,
     most: int,
     scales: Scales | None,
+    earlier: Interpolant | None,
     how: _How,
     progress: Callable[[int, int], None],
 ) -> tuple[Radial, Choice, Scales]:
@@ -198,17 +206,22 @@ def _shared(
         target = np.log(np.maximum(target, DARKEST * ordinary(target)))
         weights = _bright(light * np.exp(target).mean(axis=1))
     spatial = table.place is not None
-    if scales is None:
+    given = None
+    if earlier is not None:
+        given = _found(earlier, q)
+        scales = _scales_of(earlier, spatial, flat)
+    elif scales is None:
         scales = _validated(q, target, weights, table.group[at], spatial, flat, how.seed)
+    M = _diagonal(scales, spatial, flat)
     found = choose_centres(
-        q, target, weights, _diagonal(scales, spatial, flat), scales.stiffness, how.rule, most, how.error, progress
+        q, target, weights, M, scales.stiffness, how.rule, most, how.error, progress, given, how.until
     )
     interpolant = found.interpolant
     if how.smooth:
-        interpolant = smoothed(interpolant, q, target, weights, scales.stiffness, how.seed)
+        interpolant = smoothed(interpolant, q, target, weights, how.seed)
         for _ in range(_AGAIN if how.logarithm else 0):
             trusted = _trusted(interpolant(q), target, light)
-            interpolant = smoothed(interpolant, q, target, trusted, scales.stiffness, how.seed)
+            interpolant = smoothed(interpolant, q, target, trusted, how.seed)
     # What grazing light makes of noise is no reflectance to end at.
     steep = cosine > _GRAZING
     some = target[steep] if steep.any() else target
@@ -217,6 +230,41 @@ def _shared(
     coverage = Coverage.of(q, _diagonal(dataclasses.replace(scales, difference=_ASTRAY), spatial, flat), how.seed)
     model = Radial(interpolant, logarithm=how.logarithm, folded=how.folded, flat=flat, x=x, y=y, coverage=coverage)
     return model, found, scales
+
+
+def _earlier(start: BRDF, regions: int, how: _How) -> list[Interpolant]:
+    """The interpolants of an earlier fit, that of the largest region first."""
+    terms = [term.model if isinstance(term, Scaled) else term for term in start.lobes()]
+    if len(terms) != regions:
+        raise ParameterError(f"start has {len(terms)} parts; one for each of {regions} regions is wanted.")
+    found = []
+    for term in terms:
+        if not isinstance(term, Radial) or (term.logarithm, term.folded) != (how.logarithm, how.folded):
+            raise ParameterError(f"start was not fitted with logarithm={how.logarithm} and folded={how.folded}.")
+        found.append(term.interpolant)
+    return found
+
+
+def _found(earlier: Interpolant, q: np.ndarray) -> np.ndarray:
+    """Which of the samples q (M, d) the centres are."""
+    centres = to_numpy(earlier.centres)
+    if centres.shape[1] != q.shape[1]:
+        raise ParameterError(f"start has {centres.shape[1]} coordinates, these samples have {q.shape[1]}.")
+    off, which = cKDTree(centres).query(q, distance_upper_bound=_SAME)
+    hits = np.flatnonzero(np.isfinite(off))[::-1]
+    at = np.full(len(centres), -1)
+    at[which[hits]] = hits
+    if lost := int(np.count_nonzero(at < 0)):
+        raise ArrayError(
+            f"{lost} of {len(at)} centres of start are none of these samples: it was fitted to others, or elsewhere."
+        )
+    return at
+
+
+def _scales_of(earlier: Interpolant, spatial: bool, flat: bool) -> Scales:
+    M = to_numpy(earlier.scales)
+    space = float(M[0]) if spatial else Scales.space
+    return Scales(space, Scales.difference if flat else float(M[-1]), earlier.rho)
 
 
 def _over_sites(

@@ -29,9 +29,10 @@ _RIDGE = 1e-10  # of the diagonal's mean: what rounding leaves of directions tha
 
 
 def smoothed(
-    interpolant: Interpolant, points: np.ndarray, values: np.ndarray, weights: np.ndarray, rho: float, seed: int = 0
+    interpolant: Interpolant, points: np.ndarray, values: np.ndarray, weights: np.ndarray, seed: int = 0
 ) -> Interpolant:
-    """The interpolant with its coefficients refitted to samples: points (M, d), values (M, C), weights (M,) >= 0."""
+    """The interpolant with its coefficients refitted to samples, as stiff as it is: points (M, d), values (M, C),
+    weights (M,) >= 0."""
     C = to_numpy(interpolant.centres) * interpolant.scales
     n, p = len(C), C.shape[1] + 1
     m = int(min(len(points), max(4 * n, min(_EACH * n, _WORK / n**2))))
@@ -54,7 +55,8 @@ def smoothed(
         moment += basis.T @ (g[low : low + _BLOCK] * w[low : low + _BLOCK, None])
     Psi = cdist(C, C)
     across = A @ Psi[np.ix_(T, rest)]
-    gram[: n - p, : n - p] -= rho * (Psi[np.ix_(rest, rest)] - across - across.T + A @ Psi[np.ix_(T, T)] @ A.T)
+    bent = Psi[np.ix_(rest, rest)] - across - across.T + A @ Psi[np.ix_(T, T)] @ A.T
+    gram[: n - p, : n - p] -= interpolant.rho * bent
     gram[np.diag_indices(n)] += _RIDGE * np.trace(gram) / n
     x = cho_solve(cho_factor(gram, overwrite_a=True), moment)
     coefficients = np.empty((n, g.shape[1]))
