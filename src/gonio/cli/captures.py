@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from ..errors import FileError, ParameterError
+from .progress import bar
 
 if TYPE_CHECKING:
     from ..capture.model import Capture
@@ -36,6 +37,24 @@ def read(folder: Path, encoding: str, partial: bool, lights: Path | None = None)
     if len(given.names) != len(capture.photographs):
         raise FileError(f"{lights} has {len(given.names)} lights for {len(capture.photographs)} photographs.")
     return dataclasses.replace(capture, lights=gn.distant_lights(given.directions))
+
+
+def shaped(scene: Capture, kept: list[int] | None = None) -> Capture:
+    """The capture with normals by photometric stereo of the photographs `kept`, of all where those are too few."""
+    import numpy as np
+
+    import gonio as gn
+
+    some = scene
+    if kept is not None and len(kept) < len(scene.photographs):
+        if len(kept) > 3:
+            some = scene.select(kept)
+        else:
+            typer.echo("normals are of all photographs: those that are kept are too few", err=True)
+    with bar("normals") as progress:
+        relief = gn.photometric_stereo(some, progress=progress)
+    found = np.isfinite(relief.error) & (relief.normals[..., 2] > 0.05)
+    return dataclasses.replace(scene, normals=np.where(found[..., None], relief.normals, 0), mask=found)
 
 
 def curve(text: str) -> str | float | None:

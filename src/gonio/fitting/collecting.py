@@ -19,6 +19,7 @@ from ..directions import uvw
 from ..errors import ArrayError
 from ..samples import ReflectanceSamples
 
+SINGLE = 1e-3  # range of w within which photographs are of one theta_d
 _MOST = 1_100_000  # samples that are looked at: more tell no more
 _BACK = 0.01  # theta_d, radians, below which phi_d has no meaning
 

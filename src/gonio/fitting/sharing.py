@@ -32,13 +32,12 @@ from ..errors import ArrayError, ParameterError
 from ..samples import ReflectanceSamples
 from .albedo import DARKEST, albedo_of, ordinary
 from .centres import Choice, choose_centres
-from .collecting import Table, collected, entered
+from .collecting import SINGLE, Table, collected, entered
 from .model import Fit
 from .rules import Lookahead, Rule
 from .smoothing import smoothed
 from .validation import choose_scales
 
-_SINGLE = 1e-3  # range of w within which a photograph is of one theta_d
 _GRAZING = 0.15  # cosine of light below which noise is most of what f is
 _ASTRAY = 0.7  # what w weighs where it is asked how far from samples a fit can be trusted
 _STIFF = 0.03  # where nothing tells how noisy samples are
@@ -194,7 +193,7 @@ def _shared(
 ) -> tuple[Radial, Choice, Scales]:
     """d of one region, at the places of its samples; the choice of its centres; and scales, found where None."""
     q, at = entered(table, how.folded)
-    flat = float(np.ptp(q[:, -1])) < _SINGLE
+    flat = float(np.ptp(q[:, -1])) < SINGLE
     if flat:
         q = q[:, :-1]
     target, cosine = table.value[at], table.wi[at, 2]

@@ -17,6 +17,7 @@ from ..directions import normalise
 from ..rendering.tonemap import clipped, tone_map
 from .figures import blank, exposed, save
 from .plots import INK
+from .sky import draw_sky
 
 _MOST = 30  # photographs on a sheet, evenly chosen
 _SIDE = 160  # pixels of one
@@ -109,19 +110,10 @@ def _towards(capture: Capture | Turntable) -> tuple[str, np.ndarray | None]:
 
 
 def _directions(axes: Any, directions: Any, chosen: np.ndarray, title: str) -> None:
-    """Directions in the unit disc, x right and y up; those behind the sample are hollow."""
-    x, y, z = directions.T
-    ring = np.linspace(0, 2 * math.pi, 181)
-    for degrees in (30, 60, 90):
-        radius = math.sin(math.radians(degrees))
-        axes.plot(radius * np.cos(ring), radius * np.sin(ring), color=INK, linewidth=0.6, alpha=0.6)
-        axes.text(0, radius, f"{degrees}", color=INK, fontsize=6, ha="center", va="bottom")
-    axes.scatter(x, y, s=18, c=np.where(z > 0, "#d08a1c", "none"), edgecolors="#d08a1c", linewidths=0.8)
+    """The sky, with the numbers of those that are `chosen`."""
+    draw_sky(axes, directions, f"{len(directions)} {title}, degrees from +z")
     for k in chosen:
-        axes.annotate(f"{k}", (x[k], y[k]), textcoords="offset points", xytext=(3, 2), color=INK, fontsize=6)
-    axes.set(xlim=(-1.12, 1.12), ylim=(-1.12, 1.12), aspect="equal")
-    axes.set_title(f"{len(x)} {title}, degrees from +z", color=INK, fontsize=8)
-    axes.set_axis_off()
+        axes.annotate(f"{k}", directions[k, :2], textcoords="offset points", xytext=(3, 2), color=INK, fontsize=6)
 
 
 def _thumb(image: np.ndarray) -> np.ndarray:
