@@ -51,6 +51,15 @@ def test_what_a_model_holds_cannot_be_changed_from_outside():
         held[0] = 5
 
 
+def test_what_nobody_can_change_is_held_without_a_copy():
+    held = frozen(np.array([1.0, 2.0]))
+    assert frozen(held) is held
+    assert frozen(held, np.float32) is not held
+    view = np.array([1.0, 2.0])[:]
+    view.flags.writeable = False
+    assert frozen(view) is not view  # whoever has the array below it may write there
+
+
 def test_tensors_keep_library_dtype_device_and_gradient():
     torch = pytest.importorskip("torch")
     x = torch.tensor([1.0, 2.0], requires_grad=True)

@@ -36,6 +36,7 @@ from .capture.photometric_stereo import photometric_stereo as photometric_stereo
 from .capture.simulation import Sensor as Sensor
 from .capture.simulation import simulate as simulate
 from .capture.simulation import simulate_turntable as simulate_turntable
+from .capture.surface import surface_positions as surface_positions
 from .capture.turntable import Turntable as Turntable
 from .directions import from_half_difference as from_half_difference
 from .directions import from_spherical as from_spherical
@@ -87,6 +88,8 @@ from .files.shrm import write_shrm as write_shrm
 from .files.transforms import write_transforms as write_transforms
 from .fitting.dichromatic import share_dichromatic as share_dichromatic
 from .fitting.model import Fit as Fit
+from .fitting.planning import Plan as Plan
+from .fitting.planning import plan_sharing as plan_sharing
 from .fitting.sharing import Scales as Scales
 from .fitting.sharing import share_reflectance as share_reflectance
 from .frames import euler as euler
@@ -131,6 +134,8 @@ from .rendering.reflection_map import reflection_map as reflection_map
 from .rendering.relight import Relightable as Relightable
 from .rendering.relight import relight as relight
 from .rendering.relight import relit_confidence as relit_confidence
+from .rendering.relight import with_residuals as with_residuals
+from .rendering.residuals import Residuals as Residuals
 from .rendering.shrm import SHRM as SHRM
 from .rendering.shrm import prefilter as prefilter
 from .rendering.split_sum import split_sum as split_sum
@@ -139,8 +144,13 @@ from .rendering.tonemap import Reinhard as Reinhard
 from .rendering.tonemap import tone_map as tone_map
 from .shapes.analytic import Plane as Plane
 from .shapes.analytic import Sphere as Sphere
+from .shapes.flattening import Flattened as Flattened
+from .shapes.flattening import flatten as flatten
+from .shapes.geodesics import geodesic_distances as geodesic_distances
 from .shapes.heightfield import HeightField as HeightField
 from .shapes.mesh import Mesh as Mesh
+from .shapes.pixels import pixel_mesh as pixel_mesh
+from .shapes.places import surface_places as surface_places
 from .shapes.revolution import revolve as revolve
 from .shapes.revolution import vase as vase
 from .shapes.view import View as View

@@ -107,8 +107,13 @@ def require_broadcast(**arrays: Array) -> None:
 
 
 def frozen(x: Array, dtype: Any = np.float64) -> Array:
-    """A read-only NumPy copy of `x` to hold in a model (a tensor is held as it is, so that gradients reach it)."""
+    """A read-only NumPy copy of `x` to hold in a model (a tensor is held as it is, so that gradients reach it).
+
+    What owns its memory and is read-only already, as what another model holds, is no other's to change: not copied.
+    """
     if compat.is_array_api_obj(x) and not compat.is_numpy_array(x):
+        return x
+    if type(x) is np.ndarray and x.dtype == dtype and x.flags.owndata and not x.flags.writeable:
         return x
     copy = np.array(x, dtype=dtype)
     copy.flags.writeable = False

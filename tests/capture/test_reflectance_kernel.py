@@ -56,3 +56,12 @@ def test_brightness_is_summed_as_by_the_plain_twin(scene):
     expected, number = plain.brightness(scene["radiance"], scene["known"], scene["irradiance"])
     assert_allclose(total, expected, rtol=1e-12)
     assert_array_equal(count, number)
+
+
+def test_what_has_weight_is_gathered_as_by_the_plain_twin(rng):
+    columns = *rng.random((3, S, 3)), np.where(rng.random(S) < 0.4, rng.random(S), 0)
+    expected = plain.gather(*columns)
+    found = tuple(np.empty_like(column) for column in expected)
+    kernels.gather(*columns, *found)
+    for one, other in zip(found, expected, strict=True):
+        assert_array_equal(one, other)

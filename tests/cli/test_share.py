@@ -1,5 +1,6 @@
 """`gonio share`: photographs that were left out are predicted; and `gonio render` of what it wrote."""
 
+import dataclasses
 import json
 import shutil
 import signal
@@ -171,6 +172,30 @@ def test_what_was_shared_is_seen_from_elsewhere(capsys, tmp_path, folder, thing)
     assert 0.5 < np.median(known[known > 0]) <= 1
     code, _, err = run(capsys, "render", thing, "-o", image, "--shadows")
     assert code == 2 and "--shadows wants an --eye" in err
+
+
+def test_what_photographs_show_beyond_the_model_is_kept(capsys, tmp_path, folder):
+    output = tmp_path / "thing.gonio"
+    arguments = ("--leave", "4", "--homogeneous", "--centres", "12", "--scales", "1,.5", "--json")
+    code, out, err = run(capsys, "share", folder, "-o", output, *arguments, "--residuals")
+    assert code == 0, err
+    assert json.loads(out)["reach, noise of residuals"] == [1.0, 0.03]
+    thing, capture = gn.read_relightable(output), gn.read_capture(folder)
+    photograph, clipped = capture.photographs.read(0)
+    some = capture.mask & ~clipped
+    with_them, without = (
+        np.sqrt(np.mean((gn.relight(each, capture.lights[0]) - photograph)[some] ** 2))
+        for each in (thing, dataclasses.replace(thing, residuals=None))
+    )
+    # Of eight lights far apart a twentieth of their own goes to the noise.
+    assert with_them < 0.1 * without
+    code, out, _ = run(capsys, "info", output, "--json")
+    assert json.loads(out)["residuals"] == "of 8 photographs"
+    near = tmp_path / "near"
+    code, _, err = run(capsys, "simulate", "-o", near, "--near", "3", "--count", "3", "--size", "16")
+    assert code == 0, err
+    code, _, err = run(capsys, "share", near, "-o", output, "--residuals")
+    assert code == 2 and "near lights" in err
 
 
 def test_ctrl_c_keeps_the_centres_there_are_and_the_fit_goes_on(capsys, tmp_path, folder, thing, monkeypatch):

@@ -8,6 +8,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import gonio as gn
 from gonio.errors import EncodingWarning
+from gonio.files.photographs import PhotographFiles
 
 VECTORS = ((0.0, 0.0, 1.0), (0.6, 0.0, 0.8), (0.0, -0.6, 0.8))
 
@@ -237,3 +238,13 @@ def test_every_capture_among_the_data_opens_and_the_broken_one_says_how_it_is_br
             assert len(gn.read_capture(folder, "srgb", partial=True).photographs) == 47
         else:
             assert len(gn.read_capture(folder, "srgb").photographs) >= 12
+
+
+@pytest.mark.parametrize(("name", "bits", "channels"), [("a.png", 8, 1), ("a.png", 16, 3), ("a.tif", 32, 3)])
+def test_pixels_are_picked_as_whole_photographs_have_them(tmp_path, rng, name, bits, channels):
+    gn.write_image(tmp_path / name, rng.random((6, 8, channels)), "linear", bits=bits)
+    photographs = PhotographFiles(tmp_path, [name])
+    at = np.array([3, 47, 0, 3])
+    whole, picked = photographs.read(0), photographs.pick(0, at)
+    assert_array_equal(picked.radiance, whole.radiance.reshape(-1, 3)[at])
+    assert_array_equal(picked.clipped, whole.clipped.reshape(-1)[at])

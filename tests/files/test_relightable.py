@@ -171,3 +171,22 @@ def test_another_kind_of_gonio_file_is_refused(tmp_path, rng, view):
     write_relightable(tmp_path / "thing.gonio", Relightable(view, radial(rng, 3)))
     with pytest.raises(gn.errors.FileError, match="'relightable'; a file with 'shrm'"):
         gn.read_shrm(tmp_path / "thing.gonio")
+
+
+def test_residuals_come_back_in_half_floats(tmp_path, rng, view):
+    path, count = tmp_path / "thing.gonio", int(view.mask.sum())
+    kept = gn.Residuals(gn.normalise(rng.normal(size=(4, 3))), 1e6 * rng.normal(size=(4, count, 3)), 0.5, 0.03)
+    write_relightable(path, Relightable(view, radial(rng, 3), residuals=kept))
+    read = read_relightable(path).residuals
+    assert (read.reach, read.noise) == (0.5, 0.03)
+    np.testing.assert_allclose(read.directions, kept.directions, atol=1e-12)
+    np.testing.assert_allclose(read.images, kept.images, rtol=5e-4, atol=1e-6 * np.abs(kept.images).max())
+    for change, message in (
+        (with_fields(residuals={"reach": 1.0, "noise": 0.1}), "'residuals'"),
+        (with_fields(residuals={"reach": -1.0, "noise": 0.1, "scale": 1.0}), "reach = -1"),
+        (without("residual-images.npy"), "residual-images.npy is missing"),
+    ):
+        write_relightable(path, Relightable(view, radial(rng, 3), residuals=kept))
+        rewritten(path, change)
+        with pytest.raises(gn.errors.FileError, match=message):
+            read_relightable(path)

@@ -23,7 +23,7 @@ def folder(tmp_path, rng):
     return tmp_path
 
 
-def test_a_store_holds_what_the_files_hold_and_is_used_in_their_place(folder):
+def test_a_store_holds_what_the_files_hold_and_is_used_in_their_place(folder, rng):
     files = gn.read_capture(folder).photographs
     heard = []
     store.ingest(photograph_files(folder), folder / store.STORE, lambda done, total: heard.append((done, total)))
@@ -36,6 +36,10 @@ def test_a_store_holds_what_the_files_hold_and_is_used_in_their_place(folder):
         one, other = files.read(k), stored.read(k)
         assert_array_equal(one.radiance, other.radiance)
         assert_array_equal(one.clipped, other.clipped)
+        at = rng.permutation(70 * 130)[:50]
+        for picked in (files.pick(k, at), stored.pick(k, at)):
+            assert_array_equal(picked.radiance, one.radiance.reshape(-1, 3)[at])
+            assert_array_equal(picked.clipped, one.clipped.reshape(-1)[at])
     at = np.array([0, 127, 128, 129, 130 * 69 + 129, 5000])
     one, other = files.pixels(at), stored.pixels(at)
     assert_array_equal(one.radiance, other.radiance)

@@ -19,3 +19,9 @@ def brightness(radiance, known, irradiance):
     lit = known & (irradiance > 0).all(axis=2)
     over = (radiance / np.where(irradiance > 0, irradiance, 1)).mean(axis=2)
     return np.where(lit, over, 0).sum(axis=0), lit.sum(axis=0)
+
+
+def gather(wi, wo, value, weight):
+    """Sites whose weight is not 0, and what wi, wo, value and weight are there."""
+    at = np.flatnonzero(weight)
+    return at, wi[at], wo[at], value[at], weight[at]

@@ -53,3 +53,16 @@ def reflect(  # type: ignore[no-untyped-def]
                 blue / (E[2] * cosine),
             )
             weight[s, k] = ((E[0] + E[1] + E[2]) / 3 * cosine) ** 2
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def gather(wi, wo, value, weight, at, wi_at, wo_at, value_at, weight_at):  # type: ignore[no-untyped-def]
+    """Fill `at` (K,) with the sites of S whose weight is not 0, and the others with what wi, wo, value (S, 3) and
+    weight (S,) are there."""
+    k = 0
+    for s in range(weight.size):
+        if weight[s] != 0:
+            at[k], weight_at[k] = s, weight[s]
+            for i in range(3):
+                wi_at[k, i], wo_at[k, i], value_at[k, i] = wi[s, i], wo[s, i], value[s, i]
+            k += 1

@@ -171,12 +171,12 @@ class Capture:
 
     def observe(self, k: int) -> Observation:
         """What photograph k tells of every site."""
-        radiance, clipped = self.photographs.read(k)
-        return Observation(radiance[self.mask], ~clipped[self.mask], self._to_eye)
+        radiance, clipped = self.photographs.pick(k, self._pixels)
+        return Observation(radiance, ~clipped, self._to_eye)
 
     def observe_all(self, some: np.ndarray) -> Observation:
         """What every photograph tells of sites `some` (S,): radiance (N, S, 3), known (N, S)."""
-        radiance, clipped = self.photographs.pixels(np.flatnonzero(self.mask)[some])
+        radiance, clipped = self.photographs.pixels(self._pixels[some])
         return Observation(radiance, ~clipped, self._to_eye[some])
 
     def reflectance(self, least: float = 0.0, dark: float = 0.0, shadows: bool = True) -> Reflectance:
@@ -210,6 +210,11 @@ class Capture:
     def _view(self) -> View:
         assert self.shape is not None
         return self.shape.view(self.camera)
+
+    @cached_property
+    def _pixels(self) -> np.ndarray:
+        """Those of the sites, (S,), counted along rows."""
+        return np.flatnonzero(self.mask)
 
     @cached_property
     def _to_eye(self) -> np.ndarray:

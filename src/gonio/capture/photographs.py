@@ -15,7 +15,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .._kernels.photographs import pick
 from ..arrays import Array, frozen, require_finite, to_numpy
 from ..errors import ArrayError
 
@@ -25,6 +24,10 @@ class Photograph(NamedTuple):
 
     radiance: np.ndarray
     clipped: np.ndarray
+
+    def pick(self, at: np.ndarray) -> Photograph:
+        """The same at pixels `at` (P,), counted along rows: radiance (P, 3) and clipped (P,)."""
+        return Photograph(np.take(self.radiance.reshape(-1, 3), at, axis=0), np.take(self.clipped, at))
 
 
 class Photographs(ABC):
@@ -37,6 +40,10 @@ class Photographs(ABC):
     def read(self, k: int) -> Photograph:
         """Photograph k, whole."""
 
+    def pick(self, k: int, at: np.ndarray) -> Photograph:
+        """Photograph k at pixels `at` (P,), counted along rows: radiance (P, 3) and clipped (P,)."""
+        return self.read(k).pick(at)
+
     def pixels(self, at: np.ndarray, progress: Callable[[int, int], None] | None = None) -> Photograph:
         """All photographs at pixels `at` (P,), counted along rows: radiance (N, P, 3) and clipped (N, P).
 
@@ -45,10 +52,7 @@ class Photographs(ABC):
         radiance = np.empty((len(self), len(at), 3), np.float32)
         clipped = np.empty((len(self), len(at)), bool)
         for k in range(len(self)):
-            one = self.read(k)
-            whole, marked = one.radiance.reshape(-1, 3), one.clipped.reshape(-1)
-            whole.flags.writeable = marked.flags.writeable = False  # of the views only: one loop for all input
-            pick(whole, marked, at, radiance[k], clipped[k])
+            radiance[k], clipped[k] = self.pick(k, at)
             if progress is not None:
                 progress(k + 1, len(self))
         return Photograph(radiance, clipped)
@@ -96,6 +100,9 @@ class Chosen(Photographs):
     def read(self, k: int) -> Photograph:
         return self.photographs.read(self.which[k])
 
+    def pick(self, k: int, at: np.ndarray) -> Photograph:
+        return self.photographs.pick(self.which[k], at)
+
     def pixels(self, at: np.ndarray, progress: Callable[[int, int], None] | None = None) -> Photograph:
         radiance, clipped = self.photographs.pixels(at, progress)
         return Photograph(radiance[self.which], clipped[self.which])
@@ -118,9 +125,16 @@ class Flattened(Photographs):
         radiance, clipped = self.photographs.read(k)
         return Photograph(radiance / self.vignetting, clipped)
 
+    def pick(self, k: int, at: np.ndarray) -> Photograph:
+        radiance, clipped = self.photographs.pick(k, at)
+        return Photograph(radiance / self._divisor(at), clipped)
+
     def pixels(self, at: np.ndarray, progress: Callable[[int, int], None] | None = None) -> Photograph:
         radiance, clipped = self.photographs.pixels(at, progress)
-        return Photograph(radiance / self.vignetting.reshape(-1, self.vignetting.shape[2])[at], clipped)
+        return Photograph(radiance / self._divisor(at), clipped)
+
+    def _divisor(self, at: np.ndarray) -> np.ndarray:
+        return np.take(self.vignetting.reshape(-1, self.vignetting.shape[2]), at, axis=0)
 
     def parts(self, at: np.ndarray, most: int) -> Iterator[np.ndarray]:
         return self.photographs.parts(at, most)

@@ -74,10 +74,11 @@ class Reflectance:
                 eye, wo = seen.wo, np.asarray(to_local(sites.frames, seen.wo))
             one = Observation(seen.radiance[None], seen.known[None], wo)
             wi, value, weight = self._reflected(slice(k, k + 1), sites, one, floor, np.float64)
-            lit = np.flatnonzero(weight)
-            if lit.size:
-                parts = (np.take(x, lit, axis=0) for x in (wi[:, 0], wo, value[:, 0], weight[:, 0]))
-                yield ReflectanceSamples(lit, *parts)
+            count = np.count_nonzero(weight)
+            if count:
+                known = np.empty(count, np.intp), *(np.empty((count, 3)) for _ in range(3)), np.empty(count)
+                kernels.gather(wi[:, 0], wo, value[:, 0], weight[:, 0], *known)
+                yield ReflectanceSamples(*_sealed(*known))
 
     def at(self, some: np.ndarray) -> Slices:
         """All lights at sites `some` (S,), whole numbers below the length: quick from a store (`gonio ingest`), while
@@ -141,11 +142,19 @@ def radiance(capture: Observing) -> Iterator[RadianceSamples]:
 
     Clipped pixels are left out; all others weigh alike. Raises `ArrayError` where normals are unknown.
     """
-    sites = capture.sites
-    normal = sites.frames[:, 2]
+    normal, eye = capture.sites.frames[:, 2], np.empty(0)
     for k in range(len(capture.photographs)):
-        image, known, towards = capture.observe(k)
-        seen = known & (np.sum(normal * towards, axis=1) > 0)
-        if seen.any():
-            site = np.flatnonzero(seen)
-            yield RadianceSamples(site, normal[seen], towards[seen], image[seen], np.ones(site.size))
+        seen = capture.observe(k)
+        if seen.wo is not eye:  # as in `Reflectance`
+            eye, facing = seen.wo, np.sum(normal * seen.wo, axis=1) > 0
+        site = np.flatnonzero(seen.known & facing)
+        if site.size:
+            rows = (np.take(x, site, axis=0) for x in (normal, eye, seen.radiance))
+            yield RadianceSamples(site, *_sealed(*rows, np.ones(site.size)))
+
+
+def _sealed(*columns: np.ndarray) -> tuple[np.ndarray, ...]:
+    """The same, read-only: so samples hold them without another copy."""
+    for column in columns:
+        column.flags.writeable = False
+    return columns

@@ -276,6 +276,8 @@ def _relightable(path: Path) -> dict[str, Any]:
         "object": f"{thing.view.mask.mean():.1%} of the pixels",
         "shape": "unknown" if thing.shape is None else f"{len(thing.shape.faces)} faces",
     }
+    if thing.residuals is not None:
+        facts["residuals"] = f"of {len(thing.residuals.images)} photographs"
     for k, lobe in enumerate(thing.material.lobes()):
         term = lobe.model if isinstance(lobe, Scaled) else lobe
         assert isinstance(term, Radial)

@@ -59,6 +59,9 @@ def share(
         False, "--paper", help="As the paper: interpolate f itself over v, not fit log f over |v|."
     ),
     least: float = typer.Option(0.0, "--least", help="Leave out what is darker than this part of a pixel's mean."),
+    residuals: bool = typer.Option(
+        False, "--residuals", help="Keep what photographs show beyond the model, as shadows: this view is relit better."
+    ),
     resume: Path | None = typer.Option(
         None, "--resume", help="Go on from a .gonio of these photographs and options, stopped or of fewer centres."
     ),
@@ -72,6 +75,7 @@ def share(
     import numpy as np
 
     import gonio as gn
+    from gonio.errors import ParameterError
     from gonio.files.relightable import write_relightable
     from gonio.files.whole import writable
     from gonio.rendering.relight import Relightable
@@ -82,13 +86,15 @@ def share(
     _require_one(separate, crossed, homogeneous, resume)
     given, earlier = _scales(scales), gn.read_relightable(resume).material if resume else None
     scene = captures.read(capture, encoding, partial, lights)
+    if residuals and not all(light.distant for light in scene.lights or ()):
+        raise ParameterError(f"{capture} has near lights: --residuals are between distant ones, leave it out.")
     left = _left_out(leave, len(scene.photographs))
     kept = [k for k in range(len(scene.photographs)) if k not in left]
     behind = captures.read(crossed, encoding, partial, lights) if crossed else None
     if scene.normals is None:
         typer.echo(f"{capture}: its shape is unknown; normals by photometric stereo", err=True)
         matte = scene if behind is None else gn.parts_by_polarisers(scene, behind).diffuse
-        shaped = _shaped(matte, kept)
+        shaped = captures.shaped(matte, kept)
         scene = dataclasses.replace(scene, normals=shaped.normals, mask=shaped.mask)
     facts: dict[str, Any] = {"photographs": len(kept)}
     surface = _surface(scene)
@@ -134,6 +140,11 @@ def share(
     if scene.shape is None:
         view = dataclasses.replace(view, position=surface, lifted=surface)
     thing = Relightable(view, scene.textures(material))
+    if residuals:
+        assert scene.lights is not None
+        thing = gn.with_residuals(thing, [scene.lights[k] for k in kept], (_photograph(scene, behind, k) for k in kept))
+        assert thing.residuals is not None
+        facts["reach, noise of residuals"] = [thing.residuals.reach, thing.residuals.noise]
     ended = "; ".join(fit.reason for fit in fits.values())
     write_relightable(output, thing, f"gonio share {capture.name}: {len(kept)} photographs, {ended}")
     for name, fit in fits.items():
@@ -236,21 +247,6 @@ def _left_out(text: str, count: int) -> list[int]:
     return left
 
 
-def _shaped(scene: Capture, kept: list[int]) -> Capture:
-    """The capture with normals from the photographs that are kept, from all where those are too few."""
-    import numpy as np
-
-    import gonio as gn
-
-    some = scene.select(kept) if len(kept) > 3 else scene
-    if len(kept) <= 3:
-        typer.echo("normals are of all photographs: those that are kept are too few", err=True)
-    with bar("normals") as progress:
-        relief = gn.photometric_stereo(some, progress=progress)
-    found = np.isfinite(relief.error) & (relief.normals[..., 2] > 0.05)
-    return dataclasses.replace(scene, normals=np.where(found[..., None], relief.normals, 0), mask=found)
-
-
 def _surface(scene: Capture) -> np.ndarray:
     """Where pixels lie (rows, columns, 3), as far as the camera lets their normals tell."""
     from gonio.capture.surface import surface_positions
@@ -295,6 +291,15 @@ def _scales(text: str) -> Scales | None:
     return Scales(*values)
 
 
+def _photograph(scene: Capture, behind: Capture | None, k: int) -> tuple[np.ndarray, np.ndarray]:
+    """Radiance and what is clipped of photograph k; with one through a crossed polariser, as without polarisers."""
+    photograph, clipped = scene.photographs.read(k)
+    if behind is None:
+        return photograph, clipped
+    crossed = behind.photographs.read(k)
+    return photograph + crossed.radiance, clipped | crossed.clipped
+
+
 def _predicted(
     scene: Capture, behind: Capture | None, thing: Relightable, k: int
 ) -> tuple[np.ndarray, np.ndarray, float]:
@@ -304,10 +309,7 @@ def _predicted(
     import gonio as gn
 
     assert scene.lights is not None
-    photograph, clipped = scene.photographs.read(k)
-    if behind is not None:  # as no polariser would have it
-        crossed = behind.photographs.read(k)
-        photograph, clipped = photograph + crossed.radiance, clipped | crossed.clipped
+    photograph, clipped = _photograph(scene, behind, k)
     image = gn.relight(thing, scene.lights[k])
     some = scene.mask & ~clipped
     total = np.mean(photograph[some].astype(float) ** 2)

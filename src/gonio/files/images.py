@@ -249,12 +249,19 @@ def _require_encoding(encoding: Encoding | None) -> None:
 def _light(samples: np.ndarray, encoding: Encoding) -> np.ndarray:
     """Linear float32 of samples; codes through a table, since there are fewer of them than pixels."""
     if samples.dtype.kind == "u":
-        top = np.iinfo(samples.dtype).max
-        light: np.ndarray = _decode(np.arange(top + 1) / top, encoding).astype(np.float32)[samples]
-        return light
+        return np.take(light_of_codes(samples.dtype, encoding), samples)
     with np.errstate(over="ignore"):  # what single precision cannot hold is found by the check for infinity
-        light = _decode(samples, encoding).astype(np.float32, copy=False)
+        light: np.ndarray = _decode(samples, encoding).astype(np.float32, copy=False)
     return light
+
+
+@functools.lru_cache(maxsize=4)
+def light_of_codes(dtype: np.dtype, encoding: Encoding) -> np.ndarray:
+    """What each code of unsigned `dtype` stands for, float32, all of them."""
+    top = np.iinfo(dtype).max
+    table: np.ndarray = _decode(np.arange(top + 1) / top, encoding).astype(np.float32)
+    table.flags.writeable = False
+    return table
 
 
 def _decode(samples: np.ndarray, encoding: Encoding) -> np.ndarray:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
+from .._kernels.photographs import decode
 from ..capture.photographs import Photograph, Photographs
 from ..errors import FileError
-from .images import image_info, light, read_raster
+from .images import image_info, light, light_of_codes, read_raster
 from .raster import Encoding, Raster
 
 
@@ -38,15 +40,36 @@ class PhotographFiles(Photographs):
     def read(self, k: int) -> Photograph:
         return photograph(self.folder / self.names[k], self.raster(k), self.encoding)
 
+    def pick(self, k: int, at: np.ndarray) -> Photograph:
+        return picked(self.folder / self.names[k], self.raster(k), self.encoding, at)
+
     def raster(self, k: int) -> Raster:
         """The samples of photograph k as its file has them."""
         return read_raster(self.folder / self.names[k])
 
 
 def photograph(path: Path, raster: Raster, encoding: Encoding | None) -> Photograph:
-    """What the samples (..., C) of a file tell. Encoded as `encoding` says, or as the file does, or in sRGB."""
-    chosen = encoding if encoding is not None else raster.encoding
-    radiance = light(path, raster, "srgb" if chosen is None else chosen)
-    dtype = raster.samples.dtype
-    clipped = raster.samples == (np.iinfo(dtype).max if dtype.kind == "u" else np.inf)
-    return Photograph(radiance, np.logical_or.reduce(np.moveaxis(clipped, -1, 0)))
+    """What the samples (rows, columns, C) of a file tell, encoded as `curve` has it."""
+    samples = raster.samples
+    radiance = light(path, raster, curve(raster, encoding))
+    if samples.dtype.kind != "u":  # infinity, the brightest there is, has been refused
+        return Photograph(radiance, np.zeros(samples.shape[:2], bool))
+    brightest = samples == np.iinfo(samples.dtype).max
+    return Photograph(radiance, functools.reduce(np.logical_or, np.moveaxis(brightest, -1, 0)))
+
+
+def picked(path: Path, raster: Raster, encoding: Encoding | None, at: np.ndarray) -> Photograph:
+    """`photograph` at pixels `at` (P,), counted along rows; of codes, no others are looked at."""
+    samples = raster.samples
+    if samples.dtype.kind != "u":
+        return photograph(path, raster, encoding).pick(at)
+    radiance, clipped = np.empty((1, len(at), 3), np.float32), np.empty((1, len(at)), bool)
+    table = light_of_codes(samples.dtype, curve(raster, encoding))
+    decode(samples.reshape(1, -1, samples.shape[2]), at, table, np.arange(len(at)), radiance, clipped)
+    return Photograph(radiance[0], clipped[0])
+
+
+def curve(raster: Raster, encoding: Encoding | None) -> Encoding:
+    """`encoding`, or where it is None that of the file, or the sRGB curve."""
+    stated = raster.encoding if encoding is None else encoding
+    return "srgb" if stated is None else stated

@@ -6,6 +6,8 @@ term-K-NAME.npy centres (N, d), scales (d,), coefficients (N, C), polynomial (d 
                 x, y (rows, columns) where it is spatial; factor (rows, columns, C) or (C,) where it is scaled
 NAME.npy        mask (rows, columns) bool; position, lifted, normal, tangent, wo (sites, 3) of the mask, along its rows
 vertices, faces, uv.npy    of the shape, where it is known
+residual-directions (N, 3), residual-images (N, sites, 3), in half floats, times residuals: {reach, noise, scale} of
+                gonio.json, where they are kept (`rendering/residuals.py`)
 """
 
 from __future__ import annotations
@@ -22,6 +24,7 @@ from ..brdf.model import BRDF
 from ..brdf.radial import Interpolant, Radial
 from ..errors import FileError, GonioError
 from ..rendering.relight import Relightable
+from ..rendering.residuals import Residuals
 from ..shapes.mesh import Mesh
 from ..shapes.view import View
 from .archive import read_archive, write_archive
@@ -55,13 +58,19 @@ def write_relightable(path: str | os.PathLike[str], thing: Relightable, made: st
         arrays |= {
             f"term-{k}-{name}": to_numpy(getattr(term, name)) for name in "xy" if getattr(term, name) is not None
         }
+    fields: dict[str, Any] = {"made": made, "terms": terms}
+    if (kept := thing.residuals) is not None:
+        scale = max(float(np.abs(kept.images).max()), 1e-30)
+        fields["residuals"] = {"reach": kept.reach, "noise": kept.noise, "scale": scale}
+        arrays["residual-directions"] = kept.directions
+        arrays["residual-images"] = (kept.images / scale).astype(np.float16)
     view = thing.view
     arrays["mask"] = view.mask
     arrays |= {name: getattr(view, name)[view.mask].astype(np.float32) for name in _VIEW}
     if thing.shape is not None:
         of = {name: getattr(thing.shape, name) for name in ("vertices", "faces", "uv")}
         arrays |= {name: to_numpy(array) for name, array in of.items() if array is not None}
-    write_archive(path, _KIND, _VERSION, {"made": made, "terms": terms}, arrays)
+    write_archive(path, _KIND, _VERSION, fields, arrays)
 
 
 def read_relightable(path: str | os.PathLike[str]) -> Relightable:
@@ -77,7 +86,7 @@ def read_relightable(path: str | os.PathLike[str]) -> Relightable:
         if "vertices" in arrays:
             vertices, faces = (_array(path, arrays, name) for name in ("vertices", "faces"))
             shape = Mesh(vertices, faces, arrays.get("uv"))
-        return Relightable(_view(path, arrays), material, shape)
+        return Relightable(_view(path, arrays), material, shape, _residuals(path, fields, arrays))
     except FileError:
         raise
     except GonioError as error:
@@ -107,6 +116,18 @@ def _term(path: str | os.PathLike[str], k: int, term: Any, arrays: dict[str, np.
     )
     factor = arrays.get(f"term-{k}-factor")
     return model if factor is None else Scaled(model, factor)
+
+
+def _residuals(path: str | os.PathLike[str], fields: dict[str, Any], arrays: dict[str, np.ndarray]) -> Residuals | None:
+    told = fields.get("residuals")
+    if told is None:
+        return None
+    names = ("reach", "noise", "scale")
+    if not isinstance(told, dict) or not all(type(told.get(name)) in (int, float) for name in names):
+        raise FileError(f"{path}: the field 'residuals' is {told!r:.80}; it has {', '.join(names)}, numbers.")
+    reach, noise, scale = (float(told[name]) for name in names)
+    images = _array(path, arrays, "residual-images").astype(np.float32) * scale
+    return Residuals(_array(path, arrays, "residual-directions"), images, reach, noise)
 
 
 def _view(path: str | os.PathLike[str], arrays: dict[str, np.ndarray]) -> View:

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator
-from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -20,8 +19,8 @@ import numpy as np
 from .._kernels.photographs import decode
 from ..capture.photographs import Photograph, Photographs
 from ..errors import FileError
-from .images import read_raster
-from .photographs import PhotographFiles, photograph
+from .images import light_of_codes, read_raster
+from .photographs import PhotographFiles, photograph, picked
 from .raster import Encoding, Raster, require_size
 
 if TYPE_CHECKING:
@@ -54,10 +53,10 @@ class StoredPhotographs(Photographs):
         self._held: tuple[int, np.ndarray] | None = None
 
     def read(self, k: int) -> Photograph:
-        count = self.size[0] * self.size[1]
-        radiance, clipped = np.empty((1, count, 3), np.float32), np.empty((1, count), bool)
-        self._decode(self.raster(k).samples.reshape(1, -1, 3), np.arange(count), np.arange(count), radiance, clipped)
-        return Photograph(radiance.reshape(*self.size, 3), clipped.reshape(self.size))
+        return photograph(self.path, self.raster(k), self.encoding)
+
+    def pick(self, k: int, at: np.ndarray) -> Photograph:
+        return picked(self.path, self.raster(k), self.encoding, at)
 
     def raster(self, k: int) -> Raster:
         """The samples of photograph k as its file had them."""
@@ -69,8 +68,14 @@ class StoredPhotographs(Photographs):
     def pixels(self, at: np.ndarray, progress: Callable[[int, int], None] | None = None) -> Photograph:
         radiance = np.empty((len(self.names), len(at), 3), np.float32)
         clipped = np.empty((len(self.names), len(at)), bool)
+        curve = "srgb" if self.encoding is None else self.encoding
         for some, here, place, codes in self._chunks(np.asarray(at), progress):
-            self._decode(codes, place, here, radiance[some], clipped[some])
+            if codes.dtype.kind == "u":
+                decode(codes, place, light_of_codes(codes.dtype, curve), here, radiance[some], clipped[some])
+            else:
+                radiance[some, here], clipped[some, here] = photograph(
+                    self.path, Raster(codes[:, place]), self.encoding
+                )
         return Photograph(radiance, clipped)
 
     def rasters(self, at: np.ndarray, progress: Callable[[int, int], None] | None = None) -> Raster:
@@ -98,23 +103,6 @@ class StoredPhotographs(Photographs):
                 yield some, here, place, codes.reshape(len(codes), -1, 3)
                 if progress is not None:
                     progress(done * count + min(low + _GROUP, count), len(wanted) * count)
-
-    def _decode(
-        self, codes: np.ndarray, at: np.ndarray, here: np.ndarray, radiance: np.ndarray, clipped: np.ndarray
-    ) -> None:
-        """Fill `radiance` (n, P, 3) and `clipped` (n, P) at `here` from codes (n, all, 3) at `at`."""
-        if self._table is None:
-            radiance[:, here], clipped[:, here] = photograph(self.path, Raster(codes[:, at]), self.encoding)
-        else:
-            decode(codes, at, self._table, here, radiance, clipped)
-
-    @cached_property
-    def _table(self) -> np.ndarray | None:
-        """The light that each code stands for; None where samples are no codes."""
-        if self.codes.dtype not in (np.uint8, np.uint16):
-            return None
-        codes = np.arange(np.iinfo(self.codes.dtype).max + 1, dtype=self.codes.dtype)
-        return photograph(self.path, Raster(codes.reshape(1, -1, 1)), self.encoding).radiance[0, :, 0].copy()
 
     def parts(self, at: np.ndarray, most: int) -> Iterator[np.ndarray]:
         at = np.asarray(at)

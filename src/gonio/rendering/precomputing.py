@@ -50,7 +50,8 @@ def precompute(
     """The view of `thing` for all distant light, its images off by `error` of their rms under white noise for light.
 
     side: cells of light along the edge of a cube, 6 side^2 in all; detail of the light finer than 90/side degrees is
-    averaged. block: pixels along the side of a block. shadows: those the shape casts on itself, where it is known.
+    averaged. block: pixels along the side of a block. shadows: those the shape casts on itself, where it is known and
+    no residuals hold them.
     samples^2 directions are taken in each cell; None takes as many as `error` needs for the material's lobes.
     progress(done, total): pixels.
 
@@ -115,7 +116,8 @@ class _Responses:
     def __init__(self, thing: Relightable, cells: Cells, shadows: bool) -> None:
         view = thing.view
         self.thing, self.cells = thing, cells
-        self.shape = thing.shape if shadows else None
+        # Residuals are beside a model without shadows, and hold those there were.
+        self.shape = thing.shape if shadows and thing.residuals is None else None
         self.frames = view.frames.reshape(-1, 3, 3).astype(np.float32)
         self.wo = view.wo.reshape(-1, 3).astype(np.float32)
         self.lifted = view.lifted.reshape(-1, 3)
@@ -123,6 +125,11 @@ class _Responses:
         if self.shape is not None:
             up = np.array([[0.0, 0.0, 1.0]])
             self.shape.occluded(up, up)  # builds the ray tracer, before threads would each build one
+        if thing.residuals is not None:
+            self.place = np.cumsum(view.mask) - 1  # of a pixel among those of the mask
+            directions, weights = self._grid(2)
+            of_lights = thing.residuals.weights(directions.reshape(-1, 3)).reshape(*weights.shape, -1)
+            self.shares = np.einsum("sk,skn->nk", weights, of_lights).astype(np.float32)
 
     def of(self, parts: Sequence[np.ndarray], samples: int) -> Iterator[np.ndarray]:
         """T (C P, K) of each of the blocks, float32, made on threads and as many ahead of time."""
@@ -185,6 +192,9 @@ class _Responses:
             T[..., some] = of_cells.transpose(2, 1, 0)
         if T is None:
             T = np.zeros((1, at.size, len(self.cells)), np.float32)
+        if self.thing.residuals is not None:
+            images = self.thing.residuals.images[:, self.place[at]]
+            T = T + images.transpose(2, 1, 0) @ self.shares
         if not np.isfinite(T).all():
             raise ArrayError("the material's f is not finite at some pixels.")
         return T.reshape(-1, len(self.cells))
