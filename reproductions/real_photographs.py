@@ -135,12 +135,15 @@ def places(scene: gn.Capture) -> np.ndarray:
     return np.asarray((at - low) / (high - low).max())
 
 
-def sharing(scene: gn.Capture, kept: list[int], scales: Scales | None, smooth: bool) -> tuple[Prediction, Scales]:
+def sharing(scene: gn.Capture, kept: list[int], scales: Scales | None, smooth: bool) -> tuple[Relightable, Scales]:
     fit = share_reflectance(
         scene.select(kept).reflectance(), places(scene), centres=CENTRES, scales=scales, texture=True, smooth=smooth
     )
-    thing = Relightable(scene.view, scene.textures(fit.value.material))
-    return lambda light: gn.relight(thing, gn.distant_lights(light[None])[0])[scene.mask], fit.value.scales
+    return Relightable(scene.view, scene.textures(fit.value.material)), fit.value.scales
+
+
+def relit(thing: Relightable) -> Prediction:
+    return lambda light: gn.relight(thing, gn.distant_lights(light[None])[0])[thing.view.mask]
 
 
 def lambert(scene: gn.Capture, albedo: np.ndarray) -> Prediction:
@@ -221,9 +224,11 @@ def main(data: Path, folder: Path) -> None:
             seen, clipped = scene.photographs.pixels(np.flatnonzero(scene.mask))
             L, mine, known = directions[kept], seen[kept].astype(np.float64), ~clipped[kept]
             shared, scales = sharing(scene, kept, None, True)
+            lights, photographs = [scene.lights[k] for k in kept], (scene.photographs.read(k) for k in kept)
             models: dict[str, Prediction] = {
-                "sharing": shared,
-                "sharing, interpolated": sharing(scene, kept, scales, False)[0],
+                "sharing": relit(shared),
+                "sharing, residuals kept": relit(gn.with_residuals(shared, lights, photographs)),
+                "sharing, interpolated": relit(sharing(scene, kept, scales, False)[0]),
                 "one GGX lobe": one_lobe(scene, L, mine, known),
                 "Lambert": lambert(scene, diffuse),
                 "polynomial texture map": polynomial(L, mine, known),
@@ -250,7 +255,7 @@ def strip(path: Path, strips: list[tuple[int, np.ndarray, list[np.ndarray], dict
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    shown = ("sharing", "one GGX lobe", "polynomial texture map", "radial, by pixel", "Lambert")
+    shown = ("sharing", "sharing, residuals kept", "one GGX lobe", "polynomial texture map", "radial, by pixel")
     rows, columns = (np.flatnonzero(strips[0][1].any(axis=axis)) for axis in (1, 0))
     crop = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
     tall, wide = strips[0][1][crop].shape
@@ -280,8 +285,8 @@ def picture(path: Path, rows: list[tuple[object, ...]]) -> None:
         axes = figure.add_subplot(1, 2, k + 1)
         for j, model in enumerate(dict.fromkeys(row[2] for row in rows)):
             mine = [row for row in rows if row[2] == model and (row[1] == 6) == (k == 1)]
-            x = [names.index(row[0]) + (j - 2.5) * 0.11 for row in mine]
-            axes.plot(x, [row[3] for row in mine], "o*sv^D"[j], markersize=7, label=model)
+            x = [names.index(row[0]) + (j - 3) * 0.11 for row in mine]
+            axes.plot(x, [row[3] for row in mine], "o*Xsv^D"[j], markersize=7, label=model)
         axes.set_xticks(range(len(names)), names, rotation=40, ha="right")
         axes.set_yscale("log")
         axes.set_ylabel("relative rms of radiance, median of three lights")

@@ -14,8 +14,8 @@ LAMP = gn.normalise([0.3, -0.5, 0.7])
 
 @pytest.fixture(scope="module")
 def everywhere():
-    """Directions .45 degrees apart."""
-    return gn.LatLong(400, 800).directions().reshape(-1, 3)
+    """Directions .9 degrees apart."""
+    return gn.LatLong(200, 400).directions().reshape(-1, 3)
 
 
 def series(rng, degree, channels=3):
@@ -99,9 +99,9 @@ def test_the_minimum_of_higher_degrees_is_below_every_sample(rng, everywhere, de
     f = series(rng, degree)
     least, n = minimum(f)
     brute = gn.harmonics(degree, everywhere) @ f
-    # Samples .0045 from the minimum at most: f rises by degree^2 times half its range times .0045^2 / 2.
+    # Samples .011 from the minimum at most: f rises by degree^2 times half its range times .011^2 / 2.
     above = brute.min(axis=0) - least
-    assert np.all(above >= -1e-12) and np.all(above < degree**2 * 1e-5 * np.ptp(brute, axis=0) / 2 + 1e-12)
+    assert np.all(above >= -1e-12) and np.all(above < degree**2 * 6e-5 * np.ptp(brute, axis=0) / 2 + 1e-12)
     np.testing.assert_allclose(np.sum(gn.harmonics(degree, n) * f.T, axis=-1), least, atol=1e-13)
 
 
@@ -124,15 +124,14 @@ def test_a_positive_series_is_left_as_it_is(rng, degree):
 
 @pytest.mark.parametrize("degree", [1, 2, 3, 5])
 def test_a_deringed_series_is_nowhere_negative_and_keeps_its_mean(rng, everywhere, degree):
-    for _ in range(2):
-        f = series(rng, degree)
-        f[1] += 2  # negative somewhere
-        deringed = dering(f)
-        assert np.all(deringed.coefficients[0] == f[0])
-        np.testing.assert_array_equal(deringed.coefficients, convolve(f, deringed.window))
-        assert deringed.window.min() >= 0 and deringed.window.max() <= 1 and deringed.window.min() < 1
-        assert (gn.harmonics(degree, everywhere) @ deringed.coefficients).min() >= 0
-        assert minimum(deringed.coefficients)[0].min() >= 0
+    f = series(rng, degree)
+    f[1] += 2  # negative somewhere
+    deringed = dering(f)
+    assert np.all(deringed.coefficients[0] == f[0])
+    np.testing.assert_array_equal(deringed.coefficients, convolve(f, deringed.window))
+    assert deringed.window.min() >= 0 and deringed.window.max() <= 1 and deringed.window.min() < 1
+    assert (gn.harmonics(degree, everywhere) @ deringed.coefficients).min() >= 0
+    assert minimum(deringed.coefficients)[0].min() >= 0
 
 
 @pytest.mark.parametrize(("degree", "slack"), [(1, 1e-8), (2, 1e-8), (4, 1e-3)])
@@ -155,10 +154,10 @@ def test_no_other_window_changes_less(rng):
         return ((1 - window) ** 2 * power).sum()
 
     best = change(dering(f).window)
-    tried = [np.append(1, rng.uniform(size=2)) for _ in range(2000)]
-    tried += [family(2, width) for family in (hanning, lanczos) for width in np.geomspace(1.01, 100, 200)]
+    tried = [np.append(1, rng.uniform(size=2)) for _ in range(400)]
+    tried += [family(2, width) for family in (hanning, lanczos) for width in np.geomspace(1.01, 100, 50)]
     allowed = [w for w in tried if minimum(convolve(f, w))[0].min() >= 0]
-    assert len(allowed) > 100
+    assert len(allowed) > 30
     # The search stops at -1e-9 of the mean.
     assert min(change(w) for w in allowed) >= best * (1 - 1e-8)
 
@@ -173,7 +172,7 @@ def test_the_irradiance_of_a_lamp_loses_a_quarter_of_what_other_windows_take():
     assert 1 / 4 - 5 / 32 * ours[2] - 2 / 15 * ours[1] ** 2 / ours[2] == pytest.approx(0, abs=1e-8)
     assert lamp_error(ours) == pytest.approx(0.0561, abs=1e-4)
     for family in (hanning, lanczos):
-        windows = [family(2, width) for width in np.geomspace(1.01, 100, 400)]
+        windows = [family(2, width) for width in np.geomspace(1.01, 100, 100)]
         allowed = [w for w in windows if minimum(convolve(f, w))[0] >= 0]
         assert min(lamp_error(w) for w in allowed) > 0.2
 
