@@ -100,7 +100,7 @@ def test_brackets_of_a_folder_hold_the_brdf_within_their_noise(capsys, tmp_path)
 
 
 def test_a_folder_under_a_map_of_light_tells_no_lights_but_its_radiance(capsys, tmp_path):
-    gn.write_image(tmp_path / "sky.exr", np.full((16, 32, 3), [0.5, 1, 2]))
+    gn.write_image(tmp_path / "sky.exr", np.full((16, 32, 3), [2.0, 4, 8]))
     capture = simulated(
         capsys, tmp_path / "sim", "--brdf", "lambert:albedo=.5", "--environment", tmp_path / "sky.exr", "--size", 16
     )
@@ -108,10 +108,9 @@ def test_a_folder_under_a_map_of_light_tells_no_lights_but_its_radiance(capsys, 
     (block,) = capture.radiance()
     # All directions are as bright: a matte surface sends albedo times that; codes are radiance times an exposure.
     exposure = json.loads((tmp_path / "sim" / "truth" / "made.json").read_text())["sensor"]["exposure"]
-    good = ~capture.photographs.read(0).clipped[capture.mask].all()
-    assert good
+    assert not capture.photographs.read(0).clipped[capture.mask].any()  # however bright it is
     # The map is 16 rows of pixels: the sum over them is right to half a percent.
-    assert_allclose(block.value / exposure, np.broadcast_to([0.25, 0.5, 1.0], block.value.shape), rtol=0.01)
+    assert_allclose(block.value / exposure, np.broadcast_to([1.0, 2.0, 4.0], block.value.shape), rtol=0.01)
 
 
 def test_a_texture_comes_back_texel_by_texel(capsys, tmp_path):

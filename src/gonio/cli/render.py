@@ -86,7 +86,7 @@ def render(
         write(output, image, exposure, curve)
         typer.echo(str(output))
         if confidence:
-            gn.write_image(confidence, trusted)
+            gn.write_image(confidence, trusted, "linear")  # codes are parts of 1, not light
             typer.echo(str(confidence))
         return
     if confidence:

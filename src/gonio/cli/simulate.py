@@ -164,7 +164,7 @@ def _brightest(ideal: Capture | Turntable) -> float:
 
     photographs: SimulatedPhotographs = ideal.photographs  # type: ignore[assignment]
     some = range(0, len(photographs), max(1, len(photographs) // 8))
-    bright = max(float(np.quantile(photographs.read(k).radiance[photographs.view(k).mask], 0.999)) for k in some)
+    bright = max(float(np.quantile(photographs.truth(k)[photographs.view(k).mask], 0.999)) for k in some)
     return bright if bright > 0 else 1.0
 
 
