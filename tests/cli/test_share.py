@@ -198,7 +198,7 @@ def test_what_photographs_show_beyond_the_model_is_kept(capsys, tmp_path, folder
     assert code == 2 and "near lights" in err
 
 
-def test_ctrl_c_keeps_the_centres_there_are_and_the_fit_goes_on(capsys, tmp_path, folder, thing, monkeypatch):
+def test_ctrl_c_keeps_the_centres_there_are_and_the_fit_goes_on(capsys, tmp_path, folder, thing, monkeypatch, request):
     part, whole = tmp_path / "part.gonio", tmp_path / "whole.gonio"
     told = []
 
@@ -208,6 +208,8 @@ def test_ctrl_c_keeps_the_centres_there_are_and_the_fit_goes_on(capsys, tmp_path
             signal.raise_signal(signal.SIGINT)
         return take(self, indices)
 
+    outer = signal.signal(signal.SIGINT, signal.default_int_handler)  # in the background it may be ignored
+    request.addfinalizer(lambda: signal.signal(signal.SIGINT, outer))
     take = centres._Rounds._take
     monkeypatch.setattr(centres._Rounds, "_take", press)
     arguments = ("--leave", "4", "--centres", "200", "--json")
@@ -330,6 +332,7 @@ def test_a_capture_without_normals_goes_through_photometric_stereo(capsys, tmp_p
         (("--crossed", "none"), "none"),
         (("--separate", "colour", "--resume", "x.gonio"), "leave --separate and --crossed out"),
         (("--resume", "none.gonio"), "none.gonio does not exist"),
+        (("--resume", "none.gonio", "--scales", "1,1"), "leave --scales out"),
         (("--centres", "4"), "centres"),
         (("--picture", "seen.jpg"), "end its name in .png"),
         (("--output", "thing.exr"), "end its name in .gonio"),

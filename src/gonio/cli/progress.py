@@ -49,7 +49,9 @@ def stoppable(progress: Callable[[int, int], None]) -> Iterator[tuple[Callable[[
         asked = True
         print("gonio: stopping with what there is; once more ends at once", file=sys.stderr)
 
-    before = signal.signal(signal.SIGINT, interrupt)
+    before = signal.getsignal(signal.SIGINT)
+    if before is not signal.SIG_IGN:  # as in the background of a shell
+        signal.signal(signal.SIGINT, interrupt)
     try:
         yield heard, lambda: asked
     finally:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import enum
 import json
@@ -83,7 +84,7 @@ def share(
     for path, suffix in ((output, ".gonio"), (picture, ".png")):
         if path:
             writable(path, suffix)
-    _require_one(separate, crossed, homogeneous, resume)
+    _require_one(separate, crossed, homogeneous, resume, scales)
     given, earlier = _scales(scales), gn.read_relightable(resume).material if resume else None
     scene = captures.read(capture, encoding, partial, lights)
     if residuals and not all(light.distant for light in scene.lights or ()):
@@ -100,7 +101,8 @@ def share(
     surface = _surface(scene)
     coordinates = None
     if not homogeneous:
-        coordinates, facts["distortion of places"] = _coordinates(scene, surface, places)
+        coordinates, off = _coordinates(scene, surface, places)
+        facts |= {} if off is None else {"distortion of places": off}
     parts = _parts(scene, behind, separate, kept)
     with bar("centres") as heard, stoppable(heard) as (progress, stopped):
         options: dict[str, Any] = {
@@ -185,7 +187,7 @@ def _say(facts: dict[str, Any], output: Path, as_json: bool) -> None:
     typer.echo(str(output))
 
 
-def _require_one(separate: str, crossed: Path | None, homogeneous: bool, resume: Path | None) -> None:
+def _require_one(separate: str, crossed: Path | None, homogeneous: bool, resume: Path | None, scales: str) -> None:
     """Refuse ways to tell body and surface apart that do not go together, or cannot be gone on with."""
     from gonio.errors import ParameterError
 
@@ -197,6 +199,8 @@ def _require_one(separate: str, crossed: Path | None, homogeneous: bool, resume:
         raise ParameterError("--homogeneous is one BRDF for body and surface: leave --separate and --crossed out.")
     if resume and (separate or crossed):
         raise ParameterError("--resume goes on with body and surface in one: leave --separate and --crossed out.")
+    if resume and scales:
+        raise ParameterError(f"--resume takes the scales of {resume}: leave --scales out.")
 
 
 def _parts(scene: Capture, behind: Capture | None, separate: str, kept: list[int]) -> Parts | None:
@@ -259,21 +263,24 @@ def _surface(scene: Capture) -> np.ndarray:
         return scene.positions
 
 
-def _coordinates(scene: Capture, surface: np.ndarray, places: Places) -> tuple[np.ndarray, float]:
-    """Coordinates (S, 2) of the sites, the longer side of the object from 0 to 1 (RS 7), and their distortion."""
-
+def _coordinates(scene: Capture, surface: np.ndarray, places: Places) -> tuple[np.ndarray, float | None]:
+    """Coordinates (S, 2) of the sites, the longer side of the object from 0 to 1 (RS 7), and their distortion, where
+    pixels span a surface."""
+    from gonio.errors import ArrayError
     from gonio.shapes.flattening import distortion
     from gonio.shapes.pixels import pixel_mesh
     from gonio.shapes.places import MOST, surface_places
 
+    off: float | None = None
     if places is Places.GEODESIC:
         at, flat = surface_places(surface, scene.mask)
         off = flat.distortion
     else:
         axes = scene.camera.pose[:3, :2]
         at = scene.sites.positions @ axes
-        mesh = pixel_mesh(surface, scene.mask, most=MOST)
-        off = distortion(mesh, mesh.vertices @ axes, welded=False)
+        with contextlib.suppress(ArrayError):  # a mask of single pixels spans none
+            mesh = pixel_mesh(surface, scene.mask, most=MOST)
+            off = distortion(mesh, mesh.vertices @ axes, welded=False)
     low, high = at.min(axis=0), at.max(axis=0)
     scaled: np.ndarray = (at - low) / max(float((high - low).max()), 1e-30)
     return scaled, off
