@@ -66,17 +66,18 @@ class PolarGrid:
     @functools.cached_property
     def solid_angles(self) -> np.ndarray:
         """w (rows,) of each knot of a row, in sr."""
-        solid: np.ndarray = frozen(self._integrals(np.sin))
+        solid: np.ndarray = frozen(self.integrals(np.sin))
         return solid
 
     @functools.cached_property
     def projected(self) -> np.ndarray:
         """The same of (n.h): what D is integrated with (rows,)."""
-        projected: np.ndarray = frozen(self._integrals(lambda theta: np.sin(2 * theta) / 2))
+        projected: np.ndarray = frozen(self.integrals(lambda theta: np.sin(2 * theta) / 2))
         return projected
 
-    def _integrals(self, density: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
-        """Of each row's hat times `density` d theta, by Gauss quadrature of 16 points between two rows."""
+    def integrals(self, density: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+        """(rows,): each row's hat times density(theta) d theta, times 2 pi/columns, by Gauss quadrature of 16 points
+        between two rows."""
         x, w = np.polynomial.legendre.leggauss(16)
         part, w = 0.5 * (1 + x), 0.5 * w
         s = (np.arange(self.rows - 1)[:, None] + part) / (self.rows - 1)
