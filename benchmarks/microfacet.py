@@ -27,7 +27,8 @@ from gonio.brdf.facet_areas import FacetAreas
 from gonio.brdf.ndf_table import TabulatedNDF
 from gonio.brdf.polar_grid import PolarGrid
 from gonio.directions import from_spherical
-from gonio.fitting.partial_ndf import Bare, Domain, Ringed, Symmetric, fit_partial_ndfs
+from gonio.fitting.facet_domain import Domain
+from gonio.fitting.partial_ndf import Bare, Ringed, Symmetric, fit_partial_ndfs
 
 TABLES = 4096
 METAL = gn.GGX(0.05, 0.2)

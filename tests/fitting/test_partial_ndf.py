@@ -6,7 +6,8 @@ import pytest
 import gonio as gn
 from gonio.brdf.ndf_table import TabulatedNDF
 from gonio.brdf.polar_grid import PolarGrid
-from gonio.fitting.partial_ndf import Bare, Domain, Ringed, Symmetric, fit_partial_ndfs
+from gonio.fitting.facet_domain import Domain
+from gonio.fitting.partial_ndf import Bare, Ringed, Symmetric, fit_partial_ndfs
 
 GRID = PolarGrid(32, 96)
 WO = gn.from_spherical(np.radians(50), 0.3)

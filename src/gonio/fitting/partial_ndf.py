@@ -19,57 +19,17 @@ Not here: diffuse light, which has been taken off; what lies outside Omega (`tur
 from __future__ import annotations
 
 import dataclasses
-import functools
 
 import numpy as np
 
-from ..arrays import Array, frozen, require_finite, to_numpy
+from ..arrays import Array, require_finite, to_numpy
 from ..brdf.facet_areas import FacetAreas
 from ..brdf.fresnel import dielectric
-from ..brdf.polar_grid import PolarGrid
-from ..directions import require_unit
-from ..errors import ArrayError, DirectionError, ParameterError
+from ..errors import ArrayError, ParameterError
+from .facet_domain import Domain
 
 _SITES = 256  # at once
 _RINGS = 33  # linear between them, g is 3e-4 off
-_GRAZING = 0.05  # of light, cosine: below it noise and Fresnel's rise are most of what there is
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class Domain:
-    """What facets on a `grid` a view `wo` (3,), unit, local, shows under lights from all over the hemisphere."""
-
-    grid: PolarGrid
-    wo: Array
-
-    def __post_init__(self) -> None:
-        wo = frozen(to_numpy(self.wo), np.dtype(np.float64))
-        if wo.shape != (3,):
-            raise ArrayError(f"Domain: wo has shape {wo.shape}; (3,) is wanted.")
-        require_unit(wo, "wo")
-        if wo[2] <= 0:
-            raise DirectionError(f"Domain: wo = {wo.tolist()} is below the surface, from where nothing is seen.")
-        object.__setattr__(self, "wo", wo)
-
-    @functools.cached_property
-    def cosines(self) -> np.ndarray:
-        """h.o (rows, columns)."""
-        cosines: np.ndarray = frozen(self.grid.directions @ self.wo)
-        return cosines
-
-    @functools.cached_property
-    def lights(self) -> np.ndarray:
-        """i (rows, columns, 3): from where light is reflected to the eye; below the surface outside Omega (MS 10)."""
-        lights: np.ndarray = frozen(2 * self.cosines[..., None] * self.grid.directions - self.wo)
-        return lights
-
-    @functools.cached_property
-    def confidence(self) -> np.ndarray:
-        """W (rows, columns): the root of i.n within Omega, 0 outside (MS 12)."""
-        W = np.sqrt(np.maximum(self.lights[..., 2], 0))
-        W[(self.cosines <= 0) | (self.lights[..., 2] <= _GRAZING)] = 0
-        confidence: np.ndarray = frozen(W)
-        return confidence
 
 
 @dataclasses.dataclass(frozen=True)
