@@ -204,7 +204,7 @@ class _Pairs:
     def write_best(self, rows: np.ndarray, partners: np.ndarray, seen: np.ndarray, best: Best) -> None:
         """Into `best` at `rows` (n,) the nearest of `partners` (n, keep), where they are `seen`."""
         keep = partners.shape[1]
-        step = max(1, int(self._memory // ((keep + 1) * (self._pair + self._table))))
+        step = max(1, self._memory // (2 * (keep + 1) * (self._pair + self._table)))
         for low in range(0, len(rows), min(step, self.side)):
             some = slice(low, low + min(step, self.side))
             a, b = rows[some, None], partners[some]
