@@ -27,7 +27,8 @@ import gonio as gn
 from gonio.brdf.ndf_table import TabulatedNDF
 from gonio.brdf.polar_grid import PolarGrid
 from gonio.fitting.facet_domain import Domain
-from gonio.fitting.turned import Best, Turnable, best_turns, turned_distances
+from gonio.fitting.turnable import Turnable
+from gonio.fitting.turned import Best, best_turns, turned_distances
 
 GRID = PolarGrid(32, 96)
 DIRECT = 12  # pairs that the direct formula gets

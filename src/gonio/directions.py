@@ -102,6 +102,13 @@ def reflect(w: Array, n: Array | None = None) -> Array:
     return 2 * dot(n, w)[..., None] * n - w
 
 
+def lambert_map(w: Array) -> Array:
+    """Places (..., 2) in the unit disc of directions (..., 3) above the surface, equal areas for equal solid angles:
+    sqrt2 sin(theta / 2) (cos phi, sin phi) = (x, y) / sqrt(1 + z)."""
+    xp, w = floats(w)
+    return w[..., :2] / xp.sqrt(1 + w[..., 2:])
+
+
 def half_vector(wi: Array, wo: Array) -> Array:
     """h = (wi + wo) / |wi + wo|, (..., 3). Opposite directions have none; they are answered with the local normal."""
     xp, wi, wo = floats(wi, wo)

@@ -74,6 +74,12 @@ def test_what_faces_up_less_what_faces_down_is_the_ground_covered(rng):
     np.testing.assert_allclose(up - down, [float(TabulatedNDF(values).mass) for values in tables], rtol=1e-13)
 
 
+def test_coefficients_are_the_sum_of_what_knots_have(rng):
+    tables, areas = rng.uniform(size=(2, *GRID.shape)), FacetAreas(GRID)
+    summed = np.tensordot(tables, areas.of_knots, 2)
+    np.testing.assert_allclose(areas.coefficients(tables), summed, rtol=1e-10, atol=1e-12)
+
+
 def test_coefficients_are_those_of_a_convolution(rng):
     # The same from all harmonics at once, by gonio's own convolution.
     grid = PolarGrid(24, 40)

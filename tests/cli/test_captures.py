@@ -8,16 +8,9 @@ import json
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from reference.verbs import run
 
 import gonio as gn
-from gonio import cli
-
-
-def run(capsys, *arguments):
-    with pytest.raises(SystemExit) as stopped:
-        cli.main([str(argument) for argument in arguments])
-    out, err = capsys.readouterr()
-    return stopped.value.code, out, err
 
 
 def lights():

@@ -6,17 +6,10 @@ import sys
 
 import numpy as np
 import pytest
+from reference.verbs import run
 
 import gonio as gn
-from gonio.cli import main, parse
-
-
-def run(capsys, *arguments):
-    """(exit code, stdout, stderr) of a verb."""
-    with pytest.raises(SystemExit) as left:
-        main([str(argument) for argument in arguments])
-    said = capsys.readouterr()
-    return left.value.code, said.out, said.err
+from gonio.cli import parse
 
 
 @pytest.fixture

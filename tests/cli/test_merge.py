@@ -9,9 +9,9 @@ import cv2
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from reference.verbs import run
 
 import gonio as gn
-from gonio import cli
 from gonio.colour import srgb_encode
 from gonio.files.responses import read_response
 
@@ -19,13 +19,6 @@ TIMES = (1 / 250, 1 / 80, 1 / 15, 1 / 4, 1)
 TYPED = "1/250,1/80,1/15,0.25,1"
 GAIN, READ = 5e-5, 1e-3
 SIZE = (100, 120)
-
-
-def run(capsys, *arguments):
-    with pytest.raises(SystemExit) as stopped:
-        cli.main([str(argument) for argument in arguments])
-    out, err = capsys.readouterr()
-    return stopped.value.code, out, err
 
 
 def film(exposure):

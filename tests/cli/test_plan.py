@@ -6,17 +6,10 @@ import shutil
 
 import numpy as np
 import pytest
+from reference.verbs import run
 
 import gonio as gn
 from gonio.cli import main
-
-
-def run(capsys, *arguments):
-    """(exit code, stdout, stderr)."""
-    with pytest.raises(SystemExit) as left:
-        main([str(argument) for argument in arguments])
-    said = capsys.readouterr()
-    return left.value.code, said.out, said.err
 
 
 @pytest.fixture(scope="module")

@@ -4,19 +4,11 @@ import json
 
 import numpy as np
 import pytest
+from reference.verbs import run
 
 import gonio as gn
-from gonio.cli import main
 from gonio.cli.sh import Name
 from gonio.files.engine_harmonics import ENGINES, Engine, read_sh, to_engine, write_sh
-
-
-def run(capsys, *arguments):
-    """(exit code, stdout, stderr) of a verb."""
-    with pytest.raises(SystemExit) as left:
-        main([str(argument) for argument in arguments])
-    said = capsys.readouterr()
-    return left.value.code, said.out, said.err
 
 
 @pytest.fixture

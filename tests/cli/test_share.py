@@ -7,6 +7,7 @@ import signal
 
 import numpy as np
 import pytest
+from reference.verbs import run
 
 import gonio as gn
 from gonio.capture.photographs import Held
@@ -16,14 +17,6 @@ from gonio.fitting import centres
 from gonio.viewer.sharing import sharing_picture
 
 BRDF = ("--brdf", "lambert:albedo=.5/.4/.3", "--brdf", "ggx:alpha=.4,eta=1.5")
-
-
-def run(capsys, *arguments):
-    """(exit code, stdout, stderr)."""
-    with pytest.raises(SystemExit) as left:
-        main([str(argument) for argument in arguments])
-    said = capsys.readouterr()
-    return left.value.code, said.out, said.err
 
 
 @pytest.fixture(scope="module")

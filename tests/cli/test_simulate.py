@@ -7,20 +7,13 @@ import json
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from reference.verbs import run
 
 import gonio as gn
-from gonio import cli
 from gonio.capture.exposure import Noise
 
 BRDF = ("--brdf", "lambert:albedo=.5/.4/.3", "--brdf", "ggx:alpha=.4,eta=1.5")
 PLASTIC = gn.Lambert([0.5, 0.4, 0.3]) + gn.Microfacet(gn.GGX(0.4), gn.Fresnel(1.5))
-
-
-def run(capsys, *arguments):
-    with pytest.raises(SystemExit) as stopped:
-        cli.main([str(argument) for argument in arguments])
-    out, err = capsys.readouterr()
-    return stopped.value.code, out, err
 
 
 def simulated(capsys, folder, *arguments):

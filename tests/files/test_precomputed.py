@@ -6,7 +6,7 @@ import zipfile
 
 import numpy as np
 import pytest
-from reference.archives import rewritten, with_fields
+from reference.archives import rewritten, with_array, with_fields, without
 
 import gonio as gn
 from gonio.capture.simulation import from_above
@@ -70,19 +70,6 @@ def test_the_same_thing_makes_the_same_file(tmp_path, coarse):
     for name in ("a", "b"):
         write_precomputed(tmp_path / name, coarse)
     assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
-
-
-def without(name):
-    return lambda entries: {k: v for k, v in entries.items() if k != name}
-
-
-def with_array(name, change):
-    def changed(entries):
-        buffer = io.BytesIO()
-        np.save(buffer, np.ascontiguousarray(change(np.load(io.BytesIO(entries[f"{name}.npy"])))))
-        return entries | {f"{name}.npy": buffer.getvalue()}
-
-    return changed
 
 
 @pytest.mark.parametrize(

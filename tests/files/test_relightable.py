@@ -1,13 +1,12 @@
 """Facts about .gonio files that hold what reflectance sharing found of one view."""
 
 import dataclasses
-import io
 import json
 import zipfile
 
 import numpy as np
 import pytest
-from reference.archives import rewritten, with_fields
+from reference.archives import rewritten, with_array, with_fields, without
 
 import gonio as gn
 from gonio.brdf.coverage import Coverage
@@ -99,19 +98,6 @@ def test_other_materials_are_refused_and_leave_no_file(tmp_path, rng, view, mate
         with pytest.raises(gn.errors.FileError, match=r"a (Lambert|Sum) is not written"):
             write_relightable(path, Relightable(view, given))
     assert not path.exists()
-
-
-def without(name):
-    return lambda entries: {k: v for k, v in entries.items() if k != name}
-
-
-def with_array(name, change):
-    def changed(entries):
-        buffer = io.BytesIO()
-        np.save(buffer, np.ascontiguousarray(change(np.load(io.BytesIO(entries[f"{name}.npy"])))))
-        return entries | {f"{name}.npy": buffer.getvalue()}
-
-    return changed
 
 
 def first(value):

@@ -11,7 +11,8 @@ from gonio.brdf.ndf_table import TabulatedNDF
 from gonio.brdf.polar_grid import PolarGrid
 from gonio.errors import ArrayError, MemoryLimitError, ParameterError
 from gonio.fitting.facet_domain import Domain
-from gonio.fitting.turned import Turnable, best_turns, turned_distances
+from gonio.fitting.turnable import Turnable
+from gonio.fitting.turned import best_turns, turned_distances
 
 SMALL = PolarGrid(5, 8)
 GRID = PolarGrid(16, 48)

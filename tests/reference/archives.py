@@ -1,7 +1,10 @@
 """Changes of .gonio files: what is damaged in them is to be refused by name."""
 
+import io
 import json
 import zipfile
+
+import numpy as np
 
 
 def rewritten(path, change):
@@ -19,3 +22,16 @@ def with_fields(**fields):
         return entries | {"gonio.json": json.dumps(manifest)}
 
     return change
+
+
+def without(name):
+    return lambda entries: {k: v for k, v in entries.items() if k != name}
+
+
+def with_array(name, change):
+    def changed(entries):
+        buffer = io.BytesIO()
+        np.save(buffer, np.ascontiguousarray(change(np.load(io.BytesIO(entries[f"{name}.npy"])))))
+        return entries | {f"{name}.npy": buffer.getvalue()}
+
+    return changed

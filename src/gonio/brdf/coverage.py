@@ -20,6 +20,7 @@ from ..arrays import Array, floats, frozen, like, require_finite, to_numpy
 from ..errors import ArrayError, ParameterError
 
 LENGTH = 0.1
+_NEAR = 1.5  # spacings of samples: what is farther from all is not covered
 _MOST = 4096
 _DRAWN = 20_000
 
@@ -73,3 +74,15 @@ class Coverage:
     @cached_property
     def _tree(self) -> cKDTree:
         return cKDTree(self.points * self.scales)
+
+
+def near_samples(samples: np.ndarray, places: np.ndarray, least: float = 0.0) -> np.ndarray:
+    """Which of `places` (..., d) have one of `samples` (N, d) within 1.5 spacings, bool (...).
+
+    The spacing is the median distance of a sample to its third neighbour, the same for a lattice and for chance, and
+    `least` at the least.
+    """
+    apart = np.unique(samples.round(9), axis=0)
+    tree = cKDTree(apart)
+    spacing = max(float(np.median(tree.query(apart, k=[min(len(apart), 4)])[0])), least)
+    return np.asarray(tree.query(places)[0] <= _NEAR * spacing)

@@ -78,6 +78,13 @@ class FacetAreas:
         found = xp.reshape(waves, (-1, polar.shape[0])) @ like(polar, tables)
         return xp.reshape(found, (*tables.shape[:-2], polar.shape[1]))
 
+    @property
+    def of_knots(self) -> np.ndarray:
+        """(rows, columns, n): what a table of 1 at one knot and 0 elsewhere has for `coefficients`."""
+        azimuthal, polar = _analysis(self.grid, self.degree)
+        of_orders = polar.reshape(self.grid.rows, azimuthal.shape[1], -1)
+        return np.asarray(np.einsum("cm,rmn->rcn", azimuthal, of_orders))
+
     def areas(self, coefficients: Array, directions: Array) -> Array:
         """g (..., K) from `coefficients` (..., n) at unit local `directions` (K, 3), the same for all.
 

@@ -20,10 +20,9 @@ import math
 import numpy as np
 
 from ..arrays import Array, require_finite, to_numpy
-from ..directions import from_spherical, require_unit
+from ..brdf.coverage import near_samples
+from ..directions import from_spherical, lambert_map, require_unit
 from ..errors import ArrayError, ParameterError
-
-_NEAR = 1.5  # spacings of the samples: farther from one, and a texel is not covered
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -59,7 +58,7 @@ def push_pull(wi: Array, values: Array, n: int, weights: Array | None = None) ->
     w, v, k = _samples(wi, values, weights)
     if n < 2 or n & (n - 1):
         raise ParameterError(f"n = {n}; push and pull halve a grid whose side is a power of two.")
-    column, row = np.clip(((_plane(w) * [1, -1] + 1) * (n / 2)).astype(int), 0, n - 1).T
+    column, row = np.clip(((lambert_map(w) * [1, -1] + 1) * (n / 2)).astype(int), 0, n - 1).T
     sums, total = np.zeros((n, n, v.shape[1])), np.zeros((n, n))
     np.add.at(sums, (row, column), k[:, None] * v)
     np.add.at(total, (row, column), k)
@@ -78,7 +77,7 @@ def interpolate(wi: Array, values: Array, n: int) -> Slice:
     from scipy.spatial import QhullError, cKDTree
 
     w, v, _ = _samples(wi, values, None)
-    places, index = np.unique(_plane(w).round(9), axis=0, return_inverse=True)
+    places, index = np.unique(lambert_map(w).round(9), axis=0, return_inverse=True)
     index = index.reshape(-1)
     mean = np.zeros((len(places), v.shape[1]))
     np.add.at(mean, index, v)
@@ -88,7 +87,7 @@ def interpolate(wi: Array, values: Array, n: int) -> Slice:
     except (QhullError, ValueError) as error:
         raise ArrayError(f"{len(places)} samples on a line, or fewer than three, make no surface.") from error
     directions, inside = grid_directions(n)
-    at = _plane(directions[inside])
+    at = lambert_map(directions[inside])
     found = surface(at)
     beyond = np.isnan(found[:, 0])
     if beyond.any():
@@ -121,27 +120,12 @@ def _doubled(image: np.ndarray) -> np.ndarray:
 
 
 def _covered(w: np.ndarray, n: int) -> np.ndarray:
-    """Texels within the disc that have a sample within `_NEAR` spacings.
-
-    The spacing is the median distance of a sample to its third neighbour: the same for a lattice and for chance.
-    """
-    from scipy.spatial import cKDTree
-
+    """Texels within the disc that have a sample near."""
     directions, inside = grid_directions(n)
-    places = _plane(np.unique(w.round(9), axis=0))
-    tree = cKDTree(places)
-    # In a texel's own size at least: nearer samples fall into one.
-    others = min(len(places), 4)
-    spacing = max(float(np.median(tree.query(places, k=[others])[0])), 2 / n)
     covered = np.zeros((n, n), bool)
-    covered[inside] = tree.query(_plane(directions[inside]))[0] <= _NEAR * spacing
+    # In a texel's own size at least: nearer samples fall into one.
+    covered[inside] = near_samples(lambert_map(w), lambert_map(directions[inside]), 2 / n)
     return covered
-
-
-def _plane(w: np.ndarray) -> np.ndarray:
-    """Lambert's map of directions (N, 3), to (N, 2) in the unit disc: sin theta / sqrt(1 + cos theta) outwards."""
-    plane: np.ndarray = w[:, :2] / np.sqrt(1 + w[:, 2:])
-    return plane
 
 
 def _samples(wi: Array, values: Array, weights: Array | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

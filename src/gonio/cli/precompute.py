@@ -92,7 +92,7 @@ def _compared(
     rows, off = [], {}
     with bar("full model") as progress:
         for k, (name, light) in enumerate(lights.items()):
-            truth, image = _full(seen, light, 4 * len(made.cells), shadows), made.relight(light)
+            truth, image = gn.relight(seen, light, 4 * len(made.cells), shadows=shadows), made.relight(light)
             square = float(np.mean(truth**2))
             off[name] = float(np.sqrt(np.mean((image - truth) ** 2) / square)) if square > 0 else 0.0
             lit = truth[truth > 0]
@@ -101,25 +101,3 @@ def _compared(
             rows.append(gn.tone_map(panels * scale, clipped))
             progress(k + 1, len(lights))
     return np.concatenate(rows), off
-
-
-def _full(seen: Relightable, light: Light, beams: int, shadows: bool) -> np.ndarray:
-    """The image (rows, columns, 3) by the sum over the light, with shadows where the shape is known."""
-    import numpy as np
-
-    import gonio as gn
-    from gonio.reflection import textured
-
-    shape, view = seen.shape, seen.view
-    if shape is None or not shadows:
-        return gn.relight(seen, light, beams)
-
-    def arriving(x: np.ndarray, w: np.ndarray, distance: np.ndarray) -> np.ndarray:
-        return ~shape.occluded(x, w, distance)
-
-    m = view.mask
-    image = np.zeros((*m.shape, 3), np.float32)
-    material = textured(seen.material, None if view.uv is None else view.uv[m])
-    where = view.frames[m], view.wo[m], view.lifted[m]
-    image[m] = gn.radiance(material, light, *where, visibility=arriving, budget=beams)
-    return image

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from ..lights.model import Light
     from ..rendering.precomputed import Precomputed
     from ..rendering.relight import Relightable
+    from ..shapes.mesh import Mesh
 
 
 class Curve(enum.StrEnum):
@@ -163,9 +164,7 @@ def _around(seen: Relightable, eye: str, lens: dict[str, Any]) -> Pinhole:
 
     import gonio as gn
 
-    low, high = seen.surface.bounds
-    centre = (low + high) / 2
-    radius = np.linalg.norm(seen.surface.vertices - centre, axis=-1).max()
+    centre, radius = _ball(seen.surface)
     _, up, towards = seen.axes
     place = np.array(parse.vector(eye))
     return gn.Pinhole.look_at(
@@ -243,9 +242,17 @@ def shape_of(name: str, relief: float, smooth: bool, y_up: bool) -> tuple[Any, l
             shape = gn.Mesh(shape.vertices @ turn.T, shape.faces, shape.uv, shape.normals @ turn.T)
     else:
         shape = gn.HeightField(relief * gn.read_image(name, encoding="linear")[..., 0])
-    centre = sum(shape.bounds) / 2
-    corners = shape.mesh.vertices if isinstance(shape, gn.HeightField) else shape.vertices
-    return shape, centre.tolist(), float(np.linalg.norm(corners - centre, axis=-1).max())
+    centre, radius = _ball(shape.mesh if isinstance(shape, gn.HeightField) else shape)
+    return shape, centre.tolist(), radius
+
+
+def _ball(mesh: Mesh) -> tuple[np.ndarray, float]:
+    """Centre (3,) and radius of a ball about the mesh."""
+    import numpy as np
+
+    low, high = mesh.bounds
+    centre = (low + high) / 2
+    return centre, float(np.linalg.norm(mesh.vertices - centre, axis=-1).max())
 
 
 def _light(files: list[Path], layout: maps.Layout | None, orientation: str, suns: list[str]) -> Light:

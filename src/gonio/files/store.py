@@ -20,7 +20,7 @@ from .._kernels.photographs import decode
 from ..capture.photographs import Photograph, Photographs
 from ..errors import FileError
 from .images import light_of_codes, read_raster
-from .photographs import PhotographFiles, photograph, picked
+from .photographs import PhotographFiles, curve, photograph, picked
 from .raster import Encoding, Raster, require_size
 
 if TYPE_CHECKING:
@@ -68,10 +68,10 @@ class StoredPhotographs(Photographs):
     def pixels(self, at: np.ndarray, progress: Callable[[int, int], None] | None = None) -> Photograph:
         radiance = np.empty((len(self.names), len(at), 3), np.float32)
         clipped = np.empty((len(self.names), len(at)), bool)
-        curve = "srgb" if self.encoding is None else self.encoding
         for some, here, place, codes in self._chunks(np.asarray(at), progress):
             if codes.dtype.kind == "u":
-                decode(codes, place, light_of_codes(codes.dtype, curve), here, radiance[some], clipped[some])
+                table = light_of_codes(codes.dtype, curve(Raster(codes), self.encoding))
+                decode(codes, place, table, here, radiance[some], clipped[some])
             else:
                 radiance[some, here], clipped[some, here] = photograph(
                     self.path, Raster(codes[:, place]), self.encoding

@@ -12,16 +12,15 @@ import dataclasses
 import functools
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from ..arrays import Array, frozen, to_numpy
+from ..brdf.coverage import near_samples
 from ..brdf.polar_grid import PolarGrid
-from ..directions import half_vector, require_unit
+from ..directions import half_vector, lambert_map, require_unit
 from ..errors import ArrayError, DirectionError
 
 _GRAZING = 0.05  # of light, cosine: below it noise and Fresnel's rise are most of what there is
 _FEWEST = 4  # lights: each has a third neighbour
-_NEAR = 1.5  # spacings
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -62,10 +61,8 @@ class Domain:
         w = w[w[:, 2] > 0]
         if len(w) < _FEWEST:
             raise ArrayError(f"{len(w)} lights are above the surface; {_FEWEST} or more are wanted.")
-        tree = cKDTree(lambert_map(half_vector(w, whole.wo)))
-        spacing = float(np.median(tree.query(tree.data, k=[_FEWEST])[0]))
-        distance = tree.query(lambert_map(grid.directions))[0]
-        return cls(grid, wo, distance <= _NEAR * spacing)
+        at = lambert_map(half_vector(w, whole.wo))
+        return cls(grid, wo, near_samples(at, lambert_map(grid.directions)))
 
     @functools.cached_property
     def cosines(self) -> np.ndarray:
@@ -88,9 +85,3 @@ class Domain:
             W[~self.lit] = 0
         confidence: np.ndarray = frozen(W)
         return confidence
-
-
-def lambert_map(w: np.ndarray) -> np.ndarray:
-    """(..., 2), sqrt2 sin(theta / 2) (cos phi, sin phi) of directions (..., 3) above the surface: equal areas for equal
-    solid angles."""
-    return np.asarray(w[..., :2] / np.sqrt(1 + np.maximum(w[..., 2:], 0)))

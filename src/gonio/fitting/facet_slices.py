@@ -20,9 +20,9 @@ import numpy as np
 from scipy.spatial.distance import cdist
 
 from ..arrays import Array, frozen, require_finite, to_numpy
-from ..directions import half_vector, require_unit
+from ..directions import half_vector, lambert_map, require_unit
 from ..errors import ArrayError
-from .facet_domain import Domain, lambert_map
+from .facet_domain import Domain
 
 _APART = 1e-6  # on the map: nearer lights are one
 
@@ -46,7 +46,7 @@ class FacetSlices:
         if w[:, 2].min() <= 0:
             raise ArrayError(f"FacetSlices: lights[{int(w[:, 2].argmin())}] is below the surface; leave it out.")
         object.__setattr__(self, "lights", w)
-        at = lambert_map(half_vector(w, self.domain.wo))
+        at = self._at
         near = cdist(at, at) + np.eye(len(at))
         if near.min() < _APART:
             i, j = np.unravel_index(int(near.argmin()), near.shape)
@@ -87,7 +87,7 @@ class FacetSlices:
 
     @functools.cached_property
     def _at(self) -> np.ndarray:
-        return lambert_map(half_vector(self.lights, self.domain.wo))
+        return np.asarray(lambert_map(half_vector(self.lights, self.domain.wo)))
 
     @functools.cached_property
     def _inverse(self) -> np.ndarray:

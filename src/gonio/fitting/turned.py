@@ -30,8 +30,7 @@ import numpy as np
 
 from ..arrays import Array, frozen, to_numpy
 from ..errors import MEMORY_LIMIT, ArrayError, MemoryLimitError, ParameterError
-from .turnable import Spectra, require_alike
-from .turnable import Turnable as Turnable  # beside what takes it
+from .turnable import Spectra, Turnable, require_alike
 
 _LEAST = {np.dtype(np.float64): 1e-4, np.dtype(np.float32): 1e-2}
 _ROUNDING = {np.dtype(np.float64): 1e-12, np.dtype(np.float32): 1e-5}  # of overlaps, beside their bounds

@@ -42,6 +42,11 @@ class Light(ABC):
         `budget` is the most beams that the caller will pay for; lights that are exact with fewer ignore it.
         """
 
+    @property
+    def parts(self) -> tuple[Light, ...]:
+        """The lights of which it is the sum: itself, if it is one."""
+        return (self,)
+
     def __add__(self, other: Light) -> Light:
         from .points import Lights
 

@@ -96,10 +96,14 @@ class Lights(Light):
         for light in self.lights:
             if not isinstance(light, Light):
                 raise ParameterError(f"Lights: {type(light).__name__} is not a light.")
-            parts.extend(light.lights if isinstance(light, Lights) else [light])
+            parts.extend(light.parts)
         if not parts:
             raise ParameterError("Lights: no light was given.")
         object.__setattr__(self, "lights", tuple(parts))
+
+    @property
+    def parts(self) -> tuple[Light, ...]:
+        return self.lights
 
     @property
     def distant(self) -> bool:

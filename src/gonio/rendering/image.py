@@ -67,7 +67,7 @@ def render(
     `ParameterError` for counts that are not whole numbers from one up, `ArrayError` for an `out` that does not fit,
     `MemoryLimitError` before an image beyond the limit is made.
     """
-    environments = [part for part in _parts(light) if isinstance(part, Environment)]
+    environments = [part for part in light.parts if isinstance(part, Environment)]
     wanted = beams_wanted(material) if environments else 1
     if samples is None:
         samples = min(max(wanted, FEWEST), MOST)
@@ -140,14 +140,10 @@ def beams_wanted(material: BRDF) -> int:
     return math.ceil(16 * 4 * math.pi * densest)
 
 
-def _parts(light: Light) -> tuple[Light, ...]:
-    return light.lights if isinstance(light, Lights) else (light,)
-
-
 def _sources(light: Light, samples: int) -> list[Light | Beams]:
     """The beams of all distant lights, made once for the whole image, and the near lights, whose beams differ."""
-    near = tuple(part for part in _parts(light) if not part.distant)
-    far = tuple(part for part in _parts(light) if part.distant)
+    near = tuple(part for part in light.parts if not part.distant)
+    far = tuple(part for part in light.parts if part.distant)
     sources: list[Light | Beams] = [Lights(near)] if near else []
     return [*sources, Lights(far).beams(budget=max(samples - len(near), 1))] if far else sources
 
@@ -183,7 +179,7 @@ def _seen(
 
 def _beyond(light: Light, w: np.ndarray) -> np.ndarray | float:
     """Radiance (N, C) that arrives along `w` (N, 3) from beyond the shape; lights without extent are not seen."""
-    environments = (part for part in _parts(light) if isinstance(part, Environment))
+    environments = (part for part in light.parts if isinstance(part, Environment))
     return sum((to_numpy(part.radiance(w)) for part in environments), 0.0)
 
 

@@ -23,7 +23,6 @@ from ..lights.environment import Environment
 from ..lights.mappings import LatLongMap, Mapping
 from ..lights.model import Light
 from ..lights.orientation import Orientation
-from ..lights.points import Lights
 from ..sphere.grids import LatLong
 from ..sphere.harmonics import degree_of, harmonics, require_degree
 from ..sphere.zonal import clamped_cosine, convolve
@@ -130,7 +129,7 @@ def irradiance_map(
     """
     require_degree(degree)
     mapping = LatLongMap() if mapping is None else mapping
-    parts = light.lights if isinstance(light, Lights) else (light,)
+    parts = light.parts
     near = [type(part).__name__ for part in parts if not part.distant]
     if near:
         raise ParameterError(

@@ -24,7 +24,6 @@ from ..lights.cubes import CubeStrip
 from ..lights.environment import Environment
 from ..lights.model import Light
 from ..lights.orientation import Orientation
-from ..lights.points import Lights
 
 _CUBE = CubeStrip()
 
@@ -66,7 +65,7 @@ class Cells:
         if not light.distant:
             raise ParameterError("a near light shines otherwise on every pixel: gn.relight takes it, this does not.")
         total = np.zeros((len(self), 3))
-        for part in light.lights if isinstance(light, Lights) else (light,):
+        for part in light.parts:
             if isinstance(part, Environment):
                 cube = part.resampled(_CUBE, 6 * int(self.side), Orientation.GONIO)
                 total += to_numpy(cube.image).reshape(len(self), -1)

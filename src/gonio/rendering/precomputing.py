@@ -50,8 +50,7 @@ def precompute(
     """The view of `thing` for all distant light, its images off by `error` of their rms under white noise for light.
 
     side: cells of light along the edge of a cube, 6 side^2 in all; detail of the light finer than 90/side degrees is
-    averaged. block: pixels along the side of a block. shadows: those the shape casts on itself, where it is known and
-    no residuals hold them.
+    averaged. block: pixels along the side of a block. shadows: those that `thing.caster` casts.
     samples^2 directions are taken in each cell; None takes as many as `error` needs for the material's lobes.
     progress(done, total): pixels.
 
@@ -116,8 +115,7 @@ class _Responses:
     def __init__(self, thing: Relightable, cells: Cells, shadows: bool) -> None:
         view = thing.view
         self.thing, self.cells = thing, cells
-        # Residuals are beside a model without shadows, and hold those there were.
-        self.shape = thing.shape if shadows and thing.residuals is None else None
+        self.shape = thing.caster if shadows else None
         self.frames = view.frames.reshape(-1, 3, 3).astype(np.float32)
         self.wo = view.wo.reshape(-1, 3).astype(np.float32)
         self.lifted = view.lifted.reshape(-1, 3)

@@ -5,8 +5,7 @@
 
 and, where photographs of the view were kept, what they show beyond the model (`residuals.py`).
 
-Not here: shadows that the shape casts, and other places of the eye: `render` with `surface`, which is what is known of
-the shape from where it was seen.
+Not here: other places of the eye: `render` with `surface`, which is what is known of the shape from where it was seen.
 """
 
 from __future__ import annotations
@@ -60,6 +59,11 @@ class Relightable:
             return self.shape
         return pixel_mesh(self.view.position, self.view.mask, self.view.normal)
 
+    @property
+    def caster(self) -> Mesh | None:
+        """What casts shadows: `shape`, where it is known and no residuals hold the shadows that there were."""
+        return self.shape if self.residuals is None else None
+
     @cached_property
     def axes(self) -> np.ndarray:
         """Rows (3, 3), unit, world: right, up and towards the eye, as the picture of the view has them."""
@@ -75,10 +79,12 @@ def relight(
     light: Light,
     samples: int | None = None,
     progress: Callable[[int, int], None] | None = None,
+    shadows: bool = False,
 ) -> np.ndarray:
     """The radiance (rows, columns, 3), float32, of every pixel that sees something, 0 elsewhere.
 
     samples: the most beams of the light, what the material's lobes want where None. progress(done, total): pixels.
+    shadows: those that `thing.caster` casts.
     Near lights go without residuals, and nothing is below 0 with them.
     """
     view = thing.view
@@ -90,10 +96,18 @@ def relight(
     frames, wo = view.frames.reshape(-1, 3, 3), view.wo.reshape(-1, 3)
     lifted = view.lifted.reshape(-1, 3)
     uv = None if view.uv is None else view.uv.reshape(-1, 2)
+    shape = thing.caster if shadows else None
+
+    def arriving(x: np.ndarray, w: np.ndarray, distance: np.ndarray) -> np.ndarray:
+        assert shape is not None
+        return ~shape.occluded(x, w, distance)
+
+    visibility = None if shape is None else arriving
     for low in range(0, at.size, _SITES):
         some = at[low : low + _SITES]
         material = textured(thing.material, None if uv is None else uv[some])
-        image[some] = to_numpy(radiance(material, light, frames[some], wo[some], lifted[some], budget=samples))
+        where = frames[some], wo[some], lifted[some]
+        image[some] = to_numpy(radiance(material, light, *where, visibility=visibility, budget=samples))
         if progress is not None:
             progress(low + some.size, at.size)
     if thing.residuals is not None:

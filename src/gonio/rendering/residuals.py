@@ -25,7 +25,6 @@ from ..arrays import frozen, require_finite, to_numpy
 from ..directions import require_unit
 from ..errors import ArrayError, ParameterError
 from ..lights.model import Light
-from ..lights.points import Lights
 
 _REACHES, _NOISES = (0.25, 0.5, 1.0, 2.0), (0.01, 0.03, 0.1, 0.3, 1.0)
 _USUAL = 1.0, 0.03
@@ -81,7 +80,7 @@ class Residuals:
     def under(self, light: Light, samples: int | None = None) -> np.ndarray:
         """What is added to the radiance of the pixels, (S, 3), under the distant parts of `light`."""
         total = np.zeros((len(self.images), 3))
-        for part in light.lights if isinstance(light, Lights) else (light,):
+        for part in light.parts:
             if part.distant:
                 beams = part.beams(budget=samples)
                 total += self.weights(to_numpy(beams.directions)).T @ to_numpy(beams.irradiance)
