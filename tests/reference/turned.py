@@ -4,14 +4,14 @@ import numpy as np
 
 
 def distance(D1, W1, D2, W2, w, turn):
-    """The distance of (D1, W1) from (D2, W2) turned by `turn` columns, and the part of the first's domain that it
-    covers; w (rows,) the solid angle of a row's knots."""
+    """The distance of (D1, W1) from (D2, W2) turned by `turn` columns, and the part of its domain that lies within the
+    first's; w (rows,) the solid angle of a row's knots."""
     rows, columns = D1.shape
     s1 = s2 = domain = overlap = 0.0
     for r in range(rows):
         for c in range(columns):
             from_c = (c - turn) % columns
-            domain += w[r] * (W1[r, c] > 0)
+            domain += w[r] * (W2[r, from_c] > 0)
             if W1[r, c] * W2[r, from_c] > 0:
                 s1 += w[r] * D1[r, c]
                 s2 += w[r] * D2[r, from_c]

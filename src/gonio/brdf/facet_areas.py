@@ -80,10 +80,8 @@ class FacetAreas:
 
     @property
     def of_knots(self) -> np.ndarray:
-        """(rows, columns, n): what a table of 1 at one knot and 0 elsewhere has for `coefficients`."""
-        azimuthal, polar = _analysis(self.grid, self.degree)
-        of_orders = polar.reshape(self.grid.rows, azimuthal.shape[1], -1)
-        return np.asarray(np.einsum("cm,rmn->rcn", azimuthal, of_orders))
+        """(rows, columns, n), float32: what a table of 1 at one knot and 0 elsewhere has for `coefficients`."""
+        return _of_knots(self.grid, self.degree)
 
     def areas(self, coefficients: Array, directions: Array) -> Array:
         """g (..., K) from `coefficients` (..., n) at unit local `directions` (K, 3), the same for all.
@@ -133,6 +131,14 @@ def _kept(degree: int) -> np.ndarray:
     l, _ = degrees_and_orders(degree)
     places: np.ndarray = frozen(np.flatnonzero((l == 1) | (l % 2 == 0)), np.int64)
     return places
+
+
+@functools.lru_cache(maxsize=2)
+def _of_knots(grid: PolarGrid, degree: int) -> np.ndarray:
+    azimuthal, polar = _analysis(grid, degree)
+    of_orders = polar.reshape(grid.rows, azimuthal.shape[1], -1)
+    knots: np.ndarray = frozen(np.einsum("cm,rmn->rcn", azimuthal, of_orders), np.dtype(np.float32))
+    return knots
 
 
 @functools.lru_cache(maxsize=8)

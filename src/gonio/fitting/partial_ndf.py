@@ -21,6 +21,7 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from ..arrays import Array, require_finite, to_numpy
 from ..brdf.facet_areas import FacetAreas
@@ -125,15 +126,19 @@ class _Model:
         self.cosines = np.append(np.clip(domain.cosines[known], 0, 1), 1.0)
         self.directions = np.concatenate((domain.lights[known], domain.wo[None]))
         sources = completion.sources(known).reshape(-1)
-        coefficients = facets.of_knots.reshape(known.size, -1)
-        of_knots = np.column_stack((coefficients, np.repeat(grid.projected, grid.columns)))
-        summed = np.zeros_like(of_knots)
-        np.add.at(summed, sources[sources >= 0], of_knots[sources >= 0])
-        self.coefficients, self.mass = np.split(summed[known.reshape(-1)].astype(np.float32), [-1], axis=1)
+        # Each knot has its value from one that is known, or none: so does what is linear in them.
+        filled = np.flatnonzero(sources >= 0)
+        place = np.cumsum(known) - 1
+        shape = np.count_nonzero(known), known.size
+        gather = csr_array((np.ones(len(filled), np.float32), (place[sources[filled]], filled)), shape=shape)
+        of_knots = facets.of_knots.reshape(known.size, -1)
+        self.coefficients = gather @ of_knots
+        self.mass = gather @ np.repeat(grid.projected, grid.columns).astype(np.float32)[:, None]
 
     def fitted(self, rho: np.ndarray, eta: np.ndarray, turns: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """D, k_s (T,) and by how much D still changed (T,), from rho (T, K) and eta (T,)."""
-        F = dielectric(np, eta[:, None], self.cosines)
+        index = eta[:1] if (eta == eta[0]).all() else eta
+        F = dielectric(np, index[:, None], self.cosines)
         measured = (4 * np.maximum(rho, 0) * (F[:, -1:] / F[:, :-1])).astype(np.float32)
         # What shows least is the ground itself: g >= cos, whatever the harmonics leave out.
         least = self.directions[:, 2].astype(np.float32)

@@ -53,7 +53,7 @@ class Best:
 
 def turned_distances(first: Turnable, second: Turnable) -> tuple[np.ndarray, np.ndarray]:
     """Distances (A, B, columns) in 1/sr^2 of A distributions from B turned by 2 pi k/columns from s towards t, and the
-    part of each of the A domains that the turned one covers, (A, B, columns), in [0, 1].
+    part of each turned domain that lies within the first's, (A, B, columns), in [0, 1].
 
     Raises `ArrayError` where their grids or precisions differ, `MemoryLimitError` for too many pairs: `best_turns`
     keeps only the best.
@@ -88,10 +88,12 @@ def best_turns(
     coarse: int = 1,
     keep: int = 40,
     memory: int = 256_000_000,
+    relative: bool = False,
 ) -> Best:
-    """The nearest of B turned distributions to each of A, of those that cover between `overlap[0]` and `overlap[1]` of
-    its domain (MS 5.2 wants 50 to 85 %: likeness is told, and something is added).
+    """The nearest of B turned distributions to each of A, of those whose domains lie between `overlap[0]` and
+    `overlap[1]` within its own (MS 5.2 wants 50 to 85 %: likeness is told, and something is added).
 
+    relative: divide distances by the mean of (D1/s1)^2 + (D2/s2)^2, so that sharp facets are as far as dull ones.
     allowed: (A, B) False where a pair is excluded (itself, say). coarse: > 1 looks at means over so many rows by so
     many columns first, and then at the best `keep` of B as they are: among 1,600 cloths 4 finds the same for 99 % in
     half of the time, among 400 nothing is gained. memory: bytes to use beside the transforms.
@@ -112,10 +114,10 @@ def best_turns(
     best = Best(np.full(shape[0], -1), np.zeros(shape[0], int), np.full(shape[0], np.inf), np.zeros(shape[0]))
     if not min(shape):
         return best
-    exact = _Pairs(first, second, memory, overlap)
+    exact = _Pairs(first, second, memory, overlap, relative=relative)
     looking = exact
     if coarse != 1:
-        looking = _Pairs(first.coarser(coarse), second.coarser(coarse), memory, overlap, widened=True)
+        looking = _Pairs(first.coarser(coarse), second.coarser(coarse), memory, overlap, True, relative)
     keep = 1 if coarse == 1 else min(keep, shape[1])
     for a in looking.blocks(shape[0]):
         least = looking.least(a)
@@ -138,8 +140,10 @@ class _Pairs:
         memory: int,
         bounds: tuple[float, float] = (0.0, 1.0),
         widened: bool = False,
+        relative: bool = False,
     ) -> None:
         self.first, self.second, self.bounds, self.widened = first.spectra, second.spectra, bounds, widened
+        self.relative = relative
         number = first.dtype.itemsize
         self._pair = 16 * number * first.columns  # transforms, their products, and what W alone tells at its most
         self._table = 5 * number * first.D[0].size if len(first) else 0
@@ -170,8 +174,10 @@ class _Pairs:
         d = _turned(both, self.second.VD[b], turns)
         d *= terms.i
         d *= terms.j
-        d += terms.p
-        d += terms.r
+        squares = terms.p + terms.r
+        d += squares
+        if self.relative:
+            d /= np.where((squares > 0) & np.isfinite(squares), squares, 1)
         np.maximum(d, 0, out=d)  # what rounding leaves of equal ones
         return d
 
@@ -251,7 +257,7 @@ def _terms(x: Spectra, y: Spectra, bounds: tuple[float, float], widened: bool) -
     dtype = x.area.dtype
     least, rounding = _LEAST[dtype], _ROUNDING[dtype]
     inverse = _inverse(x.columns, dtype)
-    overlap = np.clip(_correlations(x.M, y.M, inverse) / x.area[..., None], 0, 1)
+    overlap = np.clip(_correlations(x.M, y.M, inverse) / y.area[..., None, :], 0, 1)
     lowest = highest = overlap
     if widened:
         beside = np.stack((overlap, np.roll(overlap, 1, axis=0), np.roll(overlap, -1, axis=0)))
