@@ -12,15 +12,16 @@ import dataclasses
 import functools
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ..arrays import Array, frozen, to_numpy
-from ..brdf.coverage import near_samples
 from ..brdf.polar_grid import PolarGrid
 from ..directions import half_vector, lambert_map, require_unit
 from ..errors import ArrayError, DirectionError
 
 _GRAZING = 0.05  # of light, cosine: below it noise and Fresnel's rise are most of what there is
 _FEWEST = 4  # lights: each has a third neighbour
+_NEAR = 1.5  # times as far
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -50,7 +51,8 @@ class Domain:
     def under(cls, grid: PolarGrid, wo: Array, lights: Array) -> Domain:
         """The same under `lights` (N, 3), unit, local: facets are lit whose half vector is near that of a light.
 
-        Near is 1.5 times as far as half vectors usually are from their third neighbour, on Lambert's equal-area map.
+        Near is 1.5 times as far as the nearest half vector is from its own third neighbour, on Lambert's equal-area
+        map: lamps of a plane are close together towards the horizon and far apart overhead.
         Raises `ArrayError` for fewer than four lights above the surface, `DirectionError` where they are not unit.
         """
         whole = cls(grid, wo)
@@ -62,7 +64,11 @@ class Domain:
         if len(w) < _FEWEST:
             raise ArrayError(f"{len(w)} lights are above the surface; {_FEWEST} or more are wanted.")
         at = lambert_map(half_vector(w, whole.wo))
-        return cls(grid, wo, near_samples(at, lambert_map(grid.directions)))
+        apart = np.unique(at.round(9), axis=0)
+        tree = cKDTree(apart)
+        spacing = tree.query(apart, k=[min(len(apart), _FEWEST)])[0][:, 0]
+        away, nearest = tree.query(lambert_map(grid.directions))
+        return cls(grid, wo, away <= _NEAR * spacing[nearest])
 
     @functools.cached_property
     def cosines(self) -> np.ndarray:

@@ -31,11 +31,13 @@ _MERGERS = 12
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class CompletedNDFs:
-    """`tables` (n, rows, columns) of D, whole, of integral (n.h) D = 1; `own` and `told` (n,), the parts of that
-    integral that are a distribution's own data, and that data of any told (the rest is filled); `partners`
-    (mergers, n, 2): whom it was merged with and by how many columns that was turned, -1 where none was."""
+    """`tables` (n, rows, columns) of D, whole, of integral (n.h) D = 1; `known`, the same, where data tell of D, its own
+    or others' (the rest is filled); `own` and `told` (n,), the parts of the integral that are its own data, and that
+    are known; `partners` (mergers, n, 2): whom it was merged with and by how many columns that was turned, -1 where
+    none was."""
 
     tables: np.ndarray
+    known: np.ndarray
     own: np.ndarray
     told: np.ndarray
     partners: np.ndarray
@@ -92,7 +94,7 @@ def complete_ndfs(
     total = np.where(total > 0, total, 1)
     parts = (np.sum(np.where(where, D, 0) * mass, axis=(1, 2)) / total for where in (own, told))
     return CompletedNDFs(
-        (D / total[:, None, None]).astype(np.float32), *parts, np.array(partners, int).reshape(-1, n, 2)
+        (D / total[:, None, None]).astype(np.float32), told, *parts, np.array(partners, int).reshape(-1, n, 2)
     )
 
 

@@ -1,0 +1,317 @@
+"""Example-based microfacet synthesis: a flat sample, one view and many lights to a distribution of facets at every site.
+
+    photographs -> slices (MS 8) less diffuse light (MS 9) -> partial D (MS 11) -> a few that stand for all (MS 5.3)
+    -> eta (MS 19, 20) -> each of the few made whole from the others, turned (MS 14-17)
+    -> mixtures of them (MS 18), k_d and k_s by linear least squares
+
+In this order gonio departs from the paper, which finds eta last and k_s with D: F(h.o) rises two- to sixfold over a
+slice, and D that took it for facets agrees with nothing when turned. Each step is a function of its own
+(`facet_slices`, `partial_ndf`, `representatives`, `facet_index`, `synthesis`); here they are one after another, in
+blocks of sites: what is kept of each is half floats of its partial D. Not here: relief and light from texel to texel.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+
+from ..arrays import frozen
+from ..brdf.facet_areas import FacetAreas
+from ..brdf.facet_mixture import FacetBasis, FacetMixture
+from ..brdf.polar_grid import PolarGrid
+from ..directions import normalise
+from ..errors import MEMORY_LIMIT, ArrayError, MemoryLimitError, ParameterError
+from ..reflection import processors
+from .facet_cells import Cell, Cells, Measured, Slices
+from .facet_domain import Domain
+from .facet_index import estimate_index, facing
+from .facet_slices import FacetSlices, blended_slices
+from .model import Fit
+from .partial_ndf import fit_partial_ndfs
+from .representatives import Representatives, choose_representatives
+from .synthesis import CompletedNDFs, complete_ndfs
+
+_PERCENTILE = 5.0  # of lights that count, from below, k_d (MS 9: the least, which noise draws down)
+_FLOOR = 0.05  # of a site's mean radiance: darker lights are noise or shadow (MS 9)
+_GRAZING = 0.1  # cosine of light below which k_d is not looked for
+_INDEX = 1.5  # where the search for eta begins
+_BLOCK = 256
+_KEPT = 300  # operators at once
+_COMMON = 0.5  # of a site's domain that all share, at the least
+
+# (step, done, total)
+Progress = Callable[[str, int, int], None]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class SynthesisedNDFs:
+    """`material`, whose parameters vary over the sites; `representatives`, which of them stand for all; `completed`,
+    how those were made whole; `residual` (S,), what is left of each site's radiance, relative, rms."""
+
+    material: FacetMixture
+    representatives: Representatives
+    completed: CompletedNDFs
+    residual: np.ndarray
+
+
+def synthesise_ndfs(
+    measured: Measured,
+    *,
+    grid: PolarGrid | None = None,
+    representatives: int | None = None,
+    eta: float | None = None,
+    paper: bool = False,
+    tolerance: float = 0.04,
+    seed: int = 0,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> Fit[SynthesisedNDFs]:
+    """The facets of all sites of `measured`: `capture.reflectance()` of a flat sample under many lights.
+
+    grid: of D, 32 x 96 where None, which serves cloth; `PolarGrid(96, 256)` brushed metal. representatives: 1 % of the
+    sites where None, which are made whole; twice as many take four times as long and bring the error down by a fifth.
+    eta: the refractive index, found where None. paper: MS 15 as printed for the distance, and others averaged into a
+    distribution's own data (MS 16). tolerance: radians by which half vectors may differ between the nodes at which
+    operators are made. threads: all processors where None. progress(step, done, total).
+
+    Raises `ArrayError` where lights are too few or sites have no domain in common, `ParameterError` for settings that
+    are out of range, `MemoryLimitError` before more memory is taken than the limit.
+    """
+    grid = PolarGrid() if grid is None else grid
+    if eta is not None and not 1 < eta <= 10:
+        raise ParameterError(f"eta = {eta:g}; an index in (1, 10] is wanted, or None to find it.")
+
+    def hear(step: str) -> Callable[[int, int], None]:
+        return lambda done, total: progress(step, done, total) if progress is not None else None
+
+    workers = processors() if threads is None else threads
+    partial = _Partial(measured, grid, tolerance, _INDEX if eta is None else eta, workers)
+    values = partial.values(hear("partial distributions"))
+    chosen = choose_representatives(
+        lambda low, high: values[low:high].astype(np.float32), len(measured), representatives, seed, hear("representatives")
+    )
+    few = partial.of(chosen.texels)
+    index = np.full(len(chosen.texels), _INDEX if eta is None else eta)
+    if eta is None:
+        index = estimate_index(few.tables, few.confidence, few.cosines, grid, _INDEX)
+        few = few.indexed(index)
+    completed = complete_ndfs(
+        few.tables, few.confidence, grid, relative=not paper, keep_own=not paper, progress=hear("completion")
+    )
+    whole = completed.tables if paper else few.refitted(completed.tables)
+    basis = FacetBasis.of(grid, whole, _trust(few.confidence, completed))
+    mixture = FacetMixture(
+        basis,
+        chosen.indices,
+        chosen.weights / chosen.weights.sum(axis=1, keepdims=True),
+        eta=np.clip(np.sum(chosen.weights * index[chosen.indices], axis=1), 1.01, 10),
+    )
+    material, residual, total = _coloured(measured, mixture, workers, hear("colours"))
+    return Fit(
+        SynthesisedNDFs(material, chosen, completed, residual),
+        residual=total,
+        converged=True,
+        reason=f"{len(chosen.texels)} distributions were made whole, {100 * completed.told.mean():.1f} % of facets told",
+    )
+
+
+def _trust(confidence: np.ndarray, completed: CompletedNDFs) -> np.ndarray:
+    """255 where data are a distribution's own, 128 where they are others', 0 where they were filled in."""
+    return np.where(confidence > 0, 255, np.where(completed.known, 128, 0)).astype(np.uint8)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class _Few:
+    """Partial distributions of n sites: `tables`, `confidence`, and `cosines` h.o, (n, rows, columns); what shines,
+    `rho`, the same; wo (n, 3)."""
+
+    grid: PolarGrid
+    tables: np.ndarray
+    rho: np.ndarray
+    confidence: np.ndarray
+    wo: np.ndarray
+    index: np.ndarray
+
+    @property
+    def cosines(self) -> np.ndarray:
+        return np.clip(np.einsum("rcd,nd->nrc", self.grid.directions, self.wo), 0, 1)
+
+    def indexed(self, index: np.ndarray) -> _Few:
+        """The same with another eta (n,): D is divided by what F rises."""
+        scale = facing(self.index[:, None, None], self.cosines) / facing(index[:, None, None], self.cosines)
+        return dataclasses.replace(self, tables=self.tables * scale, index=index)
+
+    def refitted(self, tables: np.ndarray) -> np.ndarray:
+        """Whole `tables` with a site's own data found anew (MS 11), with the areas of what is whole (MS 5)."""
+        areas = FacetAreas(self.grid, _degree(self.grid))
+        found = tables.astype(np.float64)
+        mass = self.grid.projected[:, None]
+        for k in range(len(found)):
+            own = self.confidence[k] > 0
+            h = self.grid.directions[own]
+            c = h @ self.wo[k]
+            i = 2 * c[:, None] * h - self.wo[k]
+            directions = np.vstack((i, self.wo[k]))
+            g = np.maximum(areas.areas(areas.coefficients(found[k]), directions), directions[:, 2])
+            D = self.rho[k][own] * g[:-1] / facing(self.index[k], np.clip(c, 0, 1))
+            m = np.broadcast_to(mass, own.shape)[own]
+            before, now = float(np.sum(m * found[k][own])), float(np.sum(m * D))
+            if now > 0:
+                found[k][own] = D * (before / now)
+        return found
+
+
+def _degree(grid: PolarGrid) -> int:
+    """Of harmonics: cloth's tables want 8, metal's finer ones 12."""
+    return 8 if grid.rows <= 32 else 12
+
+
+class _Partial:
+    """Partial distributions cell by cell; operators are made as cells ask for them, and the latest kept."""
+
+    def __init__(self, measured: Measured, grid: PolarGrid, tolerance: float, eta: float, workers: int) -> None:
+        self.measured, self.grid, self.eta, self.workers = measured, grid, eta, workers
+        self.cells = Cells.of(measured, tolerance)
+        self.domains = [Domain.under(grid, wo, wi) for wi, wo in zip(self.cells.wi, self.cells.wo, strict=True)]
+        self.lit = [np.logical_and.reduce([self.domains[k].confidence > 0 for k in c.nodes]) for c in self.cells.cells]
+        self.common = np.logical_and.reduce(self.lit)
+        solid = grid.solid_angles[:, None]
+        usual = np.mean([np.sum(solid * lit) for lit in self.lit])
+        if np.sum(solid * self.common) < _COMMON * usual:
+            raise ArrayError(
+                f"the facets that all sites show are {np.sum(solid * self.common) / usual:.0%} of what one shows: lights "
+                "are too near, or the sample too large or curved. Take a part of it (a mask), or lights farther away."
+            )
+        W = np.mean([domain.confidence for domain in self.domains], axis=0)
+        self.weights = np.sqrt(W * solid)[self.common].astype(np.float32)
+        self._operators: dict[int, FacetSlices] = {}
+
+    def values(self, hear: Callable[[int, int], None]) -> np.ndarray:
+        """(S, K), half floats: D at the knots that all sites show, weighted as MS 15 weighs."""
+        count, width = len(self.measured), len(self.weights)
+        if 2 * count * width > MEMORY_LIMIT:
+            raise MemoryLimitError(
+                f"partial distributions of {count:,} sites need {2e-9 * count * width:.1f} GB of at most "
+                f"{MEMORY_LIMIT / 1e9:g}: take a part of the sample, or a coarser grid."
+            )
+        values = np.empty((count, width), np.float16)
+        done = 0
+        for cell, (tables, _, _, _) in self._fitted(self.cells.cells):
+            values[cell.sites] = tables[:, self.common] * self.weights
+            done += len(cell.sites)
+            hear(done, count)
+        return values
+
+    def of(self, sites: np.ndarray) -> _Few:
+        """Those of some sites, in their order."""
+        wanted = np.full(len(self.measured), -1)
+        wanted[sites] = np.arange(len(sites))
+        cells = []
+        for cell in self.cells.cells:
+            mine = wanted[cell.sites] >= 0
+            if mine.any():
+                cells.append(Cell(cell.sites[mine], cell.nodes, cell.shares[mine]))
+        shape = (len(sites), *self.grid.shape)
+        tables, rho, confidence = (np.zeros(shape, np.float32) for _ in range(3))
+        wo = np.empty((len(sites), 3))
+        for cell, (found, slices, domain, _) in self._fitted(tuple(cells)):
+            at = wanted[cell.sites]
+            tables[at], rho[at], confidence[at], wo[at] = found, slices, domain.confidence, domain.wo
+        return _Few(self.grid, tables, rho, confidence, wo, np.full(len(sites), self.eta))
+
+    def _fitted(self, cells: tuple[Cell, ...]) -> Iterator[tuple[Cell, Any]]:
+        """Each cell with its tables, slices, domain and k_s, a few at a time."""
+        with ThreadPoolExecutor(self.workers) as pool:
+            for low in range(0, len(cells), 8 * self.workers):
+                some = cells[low : low + 8 * self.workers]
+                for k in {int(k) for cell in some for k in cell.nodes}:
+                    self._operator(k)
+                yield from zip(some, pool.map(self._fit, some), strict=True)
+
+    def _operator(self, k: int) -> FacetSlices:
+        if k not in self._operators:
+            if len(self._operators) >= _KEPT:
+                self._operators.pop(next(iter(self._operators)))
+            self._operators[k] = FacetSlices(self.domains[k], self.cells.wi[k])
+            _ = self._operators[k].weights
+        return self._operators[k]
+
+    def _fit(self, cell: Cell) -> tuple[np.ndarray, np.ndarray, Domain, np.ndarray]:
+        measured = self.measured.at(cell.sites)
+        nodes = [self._operator(int(k)) for k in cell.nodes]
+        wo = np.asarray(normalise(measured.wo.astype(np.float64).mean(axis=0), "the mean of wo"))
+        lit = np.logical_and.reduce([node.domain.confidence > 0 for node in nodes])
+        domain = Domain(self.grid, wo, lit)
+        rho = measured.value.mean(axis=-1)
+        known = np.isfinite(rho)
+        shine = np.maximum(np.where(known, rho, 0) - diffuse(measured).mean(axis=1, keepdims=True) / np.pi, 0)
+        slices = np.where(domain.confidence > 0, blended_slices(nodes, cell.shares, shine, known), 0)
+        slices = np.nan_to_num(slices)
+        fit = fit_partial_ndfs(slices, domain, self.eta, degree=_degree(self.grid))
+        return fit.tables, slices, domain, fit.k_s
+
+
+def diffuse(measured: Slices, percentile: float = _PERCENTILE) -> np.ndarray:
+    """k_d (S, 3): pi times the reflectance below which `percentile` of the lights lie that count (MS 9)."""
+    radiance = measured.value.mean(axis=-1) * measured.wi[..., 2]
+    with np.errstate(invalid="ignore"):
+        bright = radiance > _FLOOR * np.nanmean(radiance, axis=1, keepdims=True)
+    counts = bright & (measured.wi[..., 2] > _GRAZING)
+    counts |= ~counts.any(axis=1, keepdims=True) & np.isfinite(radiance)
+    least = np.nanpercentile(np.where(counts[..., None], measured.value, np.nan), percentile, axis=1)
+    return np.pi * np.maximum(least, 0)
+
+
+def _coloured(
+    measured: Measured, mixture: FacetMixture, workers: int, hear: Callable[[int, int], None]
+) -> tuple[FacetMixture, np.ndarray, float]:
+    """`mixture` with k_d and k_s (S, 3) >= 0 by least squares of radiance, what is left of each site's, and of all."""
+    count = len(measured)
+    k_d, k_s = np.zeros((2, count, 3))
+    off, whole = np.zeros((2, count))
+    blocks = [np.arange(low, min(low + _BLOCK, count)) for low in range(0, count, _BLOCK)]
+
+    def solved(some: np.ndarray) -> tuple[np.ndarray, ...]:
+        return _least_squares(measured.at(some), _sites(mixture, some))
+
+    with ThreadPoolExecutor(workers) as pool:
+        for some, (a, b, left, total) in zip(blocks, pool.map(solved, blocks), strict=True):
+            k_d[some], k_s[some], off[some], whole[some] = a, b, left, total
+            hear(int(some[-1]) + 1, count)
+    residual = np.sqrt(off / np.where(whole > 0, whole, 1))
+    everything = float(np.sqrt(off.sum() / whole.sum())) if whole.any() else 0.0
+    return dataclasses.replace(mixture, k_d=k_d, k_s=k_s), frozen(residual), everything
+
+
+def _sites(mixture: FacetMixture, some: np.ndarray) -> FacetMixture:
+    return dataclasses.replace(
+        mixture, indices=mixture.indices[some], weights=mixture.weights[some], k_d=0.0, k_s=1.0, eta=mixture.eta[some]
+    )
+
+
+def _least_squares(slices: Slices, lobes: FacetMixture) -> tuple[np.ndarray, ...]:
+    """k_d, k_s (S, 3), and the sums of squares of what is left and of all, (S,), each light by its weight."""
+    wi, wo = np.ascontiguousarray(np.moveaxis(slices.wi, 1, 0)), slices.wo
+    lobe = np.asarray(lobes.f(wi, wo.astype(wi.dtype)))[..., 0].T.astype(np.float64)
+    known = np.isfinite(slices.value).all(axis=-1)
+    w = np.where(known, slices.weight, 0).astype(np.float64)
+    y = np.where(known[..., None], slices.value, 0).astype(np.float64)
+    w /= np.maximum(w.sum(axis=1, keepdims=True), 1e-300)
+    # [a b; b c] (k_d/pi, k_s) = (p, q), each channel
+    a, b, c = w.sum(axis=1)[:, None], np.sum(w * lobe, axis=1)[:, None], np.sum(w * lobe**2, axis=1)[:, None]
+    p, q = np.einsum("sn,snc->sc", w, y), np.einsum("sn,snc->sc", w * lobe, y)
+    scale = np.where(c > 0, c, 1)
+    det = a * c - b * b
+    solvable = det > 1e-9 * a * c
+    det = np.where(solvable, det, 1)
+    base, shine = np.where(solvable, (c * p - b * q) / det, p), np.where(solvable, (a * q - b * p) / det, 0)
+    shine = np.where(base < 0, q / scale, shine)
+    base = np.maximum(base, 0)
+    base = np.where(shine < 0, np.maximum(p, 0), base)
+    shine = np.maximum(shine, 0)
+    left = y - base[:, None] - shine[:, None] * lobe[..., None]
+    return np.pi * base, shine, np.einsum("sn,snc->s", w, left**2), np.einsum("sn,snc->s", w, y**2)
