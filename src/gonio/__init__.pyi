@@ -144,6 +144,7 @@ from .rendering.tonemap import Reinhard as Reinhard
 from .rendering.tonemap import tone_map as tone_map
 from .shapes.analytic import Plane as Plane
 from .shapes.analytic import Sphere as Sphere
+from .shapes.drapery import cloth as cloth
 from .shapes.flattening import Flattened as Flattened
 from .shapes.flattening import flatten as flatten
 from .shapes.geodesics import geodesic_distances as geodesic_distances
@@ -151,6 +152,8 @@ from .shapes.heightfield import HeightField as HeightField
 from .shapes.mesh import Mesh as Mesh
 from .shapes.pixels import pixel_mesh as pixel_mesh
 from .shapes.places import surface_places as surface_places
+from .shapes.repeated import Repeated as Repeated
+from .shapes.revolution import cylinder as cylinder
 from .shapes.revolution import revolve as revolve
 from .shapes.revolution import vase as vase
 from .shapes.view import View as View

@@ -98,34 +98,42 @@ def radiance(
     return xp.reshape(total, (*sites, total.shape[-1]))
 
 
-def varied(model: Model, change: Callable[[Array, int], Array]) -> Model:
+def varied(
+    model: Model,
+    change: Callable[[Array, int], Array],
+    whole: Callable[[Parametric], Parametric | None] = lambda model: None,
+) -> Model:
     """`model` with each parameter that varies over sites replaced by `change(value, axes)`; terms within it too.
 
-    `axes` is how many leading axes of `value` are the sites'. A model without such parameters is returned as it is.
+    `axes` is how many leading axes of `value` are the sites'. A model or term that `whole` has an answer for is
+    replaced by it as a whole. A model without such parameters is returned as it is.
     """
+    if (instead := whole(model)) is not None:
+        return instead  # type: ignore[return-value]
     changed: dict[str, Any] = {}
     for field in dataclasses.fields(model):  # type: ignore[arg-type]
         value = getattr(model, field.name)
         new = value
         if isinstance(value, Parametric):
-            new = varied(value, change)
+            new = varied(value, change, whole)
         elif isinstance(value, tuple):
-            new = tuple(varied(v, change) if isinstance(v, Parametric) else v for v in value)
+            new = tuple(varied(v, change, whole) if isinstance(v, Parametric) else v for v in value)
             new = value if all(a is b for a, b in zip(new, value, strict=True)) else new
         elif field.name in model.bounds and value is not None:
-            axes = value.ndim - (model.bounds[field.name].colour and value.ndim > 0)
+            axes = model.bounds[field.name].axes(value)
             new = change(value, axes) if axes > 0 else value
         if new is not value:
             changed[field.name] = new
     return dataclasses.replace(model, **changed) if changed else model  # type: ignore[type-var]
 
 
-def textured(model: Model, uv: Array | None) -> Model:
+def textured(model: Model, uv: Array | None, width: Array | None = None) -> Model:
     """`model` at N sites with texture coordinates `uv` (N, 2): parameters that vary over two axes are textures.
 
     A texture is (rows, columns), or (rows, columns, C) of a colour, row 0 at v = 1; between texels' centres it is
-    bilinear, beyond the outermost constant. Raises `ParameterError` for a parameter that varies over other axes, or
-    where there is no uv to look it up by.
+    bilinear, beyond the outermost constant. `width` (N,), the root of each footprint's area in (u, v), is for terms
+    with levels of averages (`FacetMixture.at`); other parameters are looked up at the point. Raises `ParameterError`
+    for a parameter that varies over other axes, or where there is no uv to look it up by.
     """
 
     def looked_up(value: Array, axes: int) -> np.ndarray:
@@ -141,7 +149,7 @@ def textured(model: Model, uv: Array | None) -> Model:
         found = [ndimage.map_coordinates(layer, place, order=1, mode="nearest") for layer in layers]
         return np.stack(found, axis=-1).reshape(-1, *texture.shape[2:])
 
-    return varied(model, looked_up)
+    return varied(model, looked_up, lambda term: term.at(uv, width))
 
 
 def processors() -> int:

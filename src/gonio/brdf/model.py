@@ -28,11 +28,21 @@ from ..errors import ParameterError
 
 @dataclasses.dataclass(frozen=True)
 class Bounds:
-    """The closed range of a parameter, and whether it is a colour: what `BRDF.bounds` holds for each name."""
+    """The closed range of a parameter, and whether it is a colour: what `BRDF.bounds` holds for each name.
+
+    `own` is how many axes beside a colour's belong to the parameter itself; the axes before them are sites'. `dtype`
+    is what it is held in.
+    """
 
     low: float
     high: float
     colour: bool = False
+    own: int = 0
+    dtype: type = np.float64
+
+    def axes(self, value: Array) -> int:
+        """How many leading axes of `value` are sites'."""
+        return max(int(value.ndim) - self.own - self.colour, 0)
 
 
 class Parametric:
@@ -45,7 +55,7 @@ class Parametric:
             if getattr(self, name) is None:  # a parameter that may be left out
                 continue
             try:
-                value = frozen(getattr(self, name))
+                value = frozen(getattr(self, name), bound.dtype)
             except (TypeError, ValueError) as error:
                 raise ParameterError(f"{type(self).__name__}: {name} is not a number or an array of them.") from error
             xp = namespace(value)
@@ -61,6 +71,13 @@ class Parametric:
                     "a colour is a number or (..., 1) or (..., 3)."
                 )
             object.__setattr__(self, name, value)
+
+    def at(self, uv: Array | None, width: Array | None = None) -> Any:
+        """This at N sites with texture coordinates `uv` (N, 2), where parameters cannot be looked up one by one.
+
+        `width` (N,) is the root of each one's footprint's area in (u, v).
+        """
+        return None
 
     @classmethod
     def parameters(cls) -> tuple[str, ...]:

@@ -36,7 +36,7 @@ class TabulatedNDF(NDF):
     values: Array
     warp: float = 1.5
 
-    bounds: ClassVar[dict[str, Bounds]] = {"values": Bounds(0.0, 1e30)}
+    bounds: ClassVar[dict[str, Bounds]] = {"values": Bounds(0.0, 1e30, own=2)}
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -101,6 +101,19 @@ class Reflectance:
         wi, value, weight = self._reflected(every, sites, local, floor, np.float32)
         return Slices(wi, local.wo, value, weight)
 
+    @property
+    def sites(self) -> Sites:
+        """Those of the capture."""
+        return self.capture.sites
+
+    def directions(self, positions: np.ndarray, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """wi (S, N, 3) and wo (S, 3), local in `frames` (S, 3, 3), of the lights and the eye from any `positions`
+        (S, 3). Raises `ArrayError` where photographs are from many places."""
+        towards = self._arriving(slice(0, len(self.capture.photographs)), Sites(positions, positions, frames))[0]
+        towards = np.broadcast_to(towards, (len(towards), *positions.shape))
+        wi = np.asarray(to_local(frames[:, None], np.moveaxis(towards, 0, 1)))
+        return wi, np.asarray(to_local(frames, self.capture.towards_eye(positions)))
+
     @cached_property
     def _floor(self) -> np.ndarray:
         """Below which a site is left out, (sites,), of radiance over irradiance, the mean of the channels."""

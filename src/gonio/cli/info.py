@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 if TYPE_CHECKING:
+    from ..brdf.facet_mixture import FacetMixture
     from ..capture.model import Capture
     from ..capture.turntable import Turntable
 
@@ -27,7 +28,7 @@ def info(
     files: list[Path] = typer.Argument(..., help="Images, environment maps, BRDFs, meshes; folders of captures."),
     as_json: bool = typer.Option(False, "--json", help="One JSON object a file, a line each."),
     picture: Path | None = typer.Option(None, "--picture", help="A PNG to look at: an image, or the lobes of BRDFs."),
-    pixels: str = typer.Option("", "--pixels", help="Of a .gonio of gonio share, whose lobes to draw: row,column;..."),
+    pixels: str = typer.Option("", "--pixels", help="Of a .gonio, whose lobes or facets to draw: row,column;..."),
 ) -> None:
     """Say what files hold: sizes, formats, ranges, albedos, what looks wrong."""
     if picture:
@@ -89,9 +90,11 @@ def _draw(files: list[Path], picture: Path, pixels: str) -> None:
 
 
 def _draw_lobes(path: Path, picture: Path, pixels: str) -> None:
-    """The lobes of a shared material at pixels of its view."""
+    """The lobes of a shared material, or the facets of a mixture, at pixels of its view."""
     import gonio as gn
+    from gonio.brdf.facet_mixture import FacetMixture
     from gonio.errors import ParameterError
+    from gonio.viewer.facets import facets_picture
     from gonio.viewer.lobes import lobes_picture, spread_pixels
 
     from . import parse
@@ -111,7 +114,7 @@ def _draw_lobes(path: Path, picture: Path, pixels: str) -> None:
             chosen.append((row, column))
         if len(chosen) > 6:
             raise ParameterError(f"--pixels {pixels}: {len(chosen)} pixels; six at most are drawn.")
-    lobes_picture(picture, thing, chosen)
+    (facets_picture if isinstance(thing.material, FacetMixture) else lobes_picture)(picture, thing, chosen)
 
 
 def _image(path: Path) -> dict[str, Any]:
@@ -265,12 +268,13 @@ def _relightable(path: Path) -> dict[str, Any]:
     import numpy as np
 
     import gonio as gn
-    from gonio.brdf.combine import Scaled
+    from gonio.brdf.combine import Scaled, Sum
+    from gonio.brdf.facet_mixture import FacetMixture
     from gonio.brdf.radial import Radial
 
     thing = gn.read_relightable(path)
     facts: dict[str, Any] = {
-        "kind": "shared material",
+        "kind": "facet material" if isinstance(thing.material, FacetMixture) else "shared material",
         "rows": thing.view.mask.shape[0],
         "columns": thing.view.mask.shape[1],
         "object": f"{thing.view.mask.mean():.1%} of the pixels",
@@ -278,8 +282,13 @@ def _relightable(path: Path) -> dict[str, Any]:
     }
     if thing.residuals is not None:
         facts["residuals"] = f"of {len(thing.residuals.images)} photographs"
-    for k, lobe in enumerate(thing.material.lobes()):
-        term = lobe.model if isinstance(lobe, Scaled) else lobe
+    if isinstance(thing.material, FacetMixture):
+        return facts | _facets(thing.material) | {"bytes": path.stat().st_size}
+    for k, given in enumerate(thing.material.terms if isinstance(thing.material, Sum) else (thing.material,)):
+        term = given.model if isinstance(given, Scaled) else given
+        if isinstance(term, FacetMixture):
+            facts[f"term {k}"] = _facets(term)
+            continue
         assert isinstance(term, Radial)
         of = term.interpolant
         facts[f"term {k}"] = (
@@ -287,6 +296,35 @@ def _relightable(path: Path) -> dict[str, Any]:
             f"of {'log f' if term.logarithm else 'f'}"
         )
         facts[f"scales of term {k}"] = np.asarray(of.scales).tolist()
+    return facts
+
+
+def _facets(material: FacetMixture) -> dict[str, Any]:
+    import numpy as np
+
+    from gonio.arrays import to_numpy
+
+    grid, tables = material.basis.grid, to_numpy(material.basis.tables)
+    facts = {
+        "representatives": len(tables),
+        "grid": f"{grid.rows} x {grid.columns}, warp {grid.warp:g}",
+        "pairs a texel": material.indices.shape[-1],
+        "median eta": float(np.median(material.eta)),
+        **{
+            f"mean {name}": [float(x) for x in np.atleast_1d(value.mean(axis=tuple(range(value.ndim - 1))))]
+            for name in ("k_d", "k_s")
+            for value in [to_numpy(getattr(material, name))]
+        },
+    }
+    if material.basis.trust is not None:
+        # Of all texels, by what each table adds to them.
+        drawn = np.clip(to_numpy(material.weights), 0, None)
+        drawn, indices = np.broadcast_arrays(drawn / drawn.sum(axis=-1, keepdims=True), to_numpy(material.indices))
+        use = np.bincount(indices.ravel(), drawn.ravel(), minlength=len(tables))
+        trust = to_numpy(material.basis.trust)
+        kinds = {"own data": trust == 255, "others": (trust > 0) & (trust < 255), "no data": trust == 0}
+        told = [np.einsum("krc,r,k->", tables * where, grid.projected, use) for where in kinds.values()]
+        facts["facets told by"] = {name: float(part / sum(told)) for name, part in zip(kinds, told, strict=True)}
     return facts
 
 

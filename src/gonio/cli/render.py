@@ -16,11 +16,13 @@ from .progress import bar
 if TYPE_CHECKING:
     import numpy as np
 
+    from ..brdf.model import BRDF
     from ..cameras import Pinhole
     from ..lights.model import Light
     from ..rendering.precomputed import Precomputed
     from ..rendering.relight import Relightable
     from ..shapes.mesh import Mesh
+    from ..shapes.view import Shape
 
 
 class Curve(enum.StrEnum):
@@ -32,14 +34,17 @@ class Curve(enum.StrEnum):
 
 
 def render(
-    thing: Path | None = typer.Argument(None, help="A .gonio of gonio share or precompute, relit."),
+    thing: Path | None = typer.Argument(None, help="A .gonio, relit; with --shape what it is made of, on that shape."),
     output: Path = typer.Option(..., "--output", "-o", help="image.exr (linear), or image.png (tone-mapped)."),
     brdf: list[str] = typer.Option(
         ["lambert:albedo=.6"],
         "--brdf",
         help="A measured file, or name:key=value,... with colours as r/g/b: lambert, ggx, ward, ... Repeat to add.",
     ),
-    shape: str = typer.Option("sphere", "--shape", help="sphere, vase, a mesh file, or an image of heights."),
+    shape: str = typer.Option(
+        "", "--shape", help="sphere (if none is given), cylinder, cloth, vase, a mesh file, or an image of heights."
+    ),
+    repeat: int = typer.Option(1, "--repeat", help="Tiles of the texture along each side of the shape's."),
     smooth: bool = typer.Option(False, "--smooth", help="Give a mesh smooth normals in place of its file's."),
     y_up: bool = typer.Option(False, "--y-up", help="Stand a mesh up whose file has y upwards."),
     light: list[Path] = typer.Option([], "--light", help="An environment map. Without any light: a room of gonio's."),
@@ -79,11 +84,18 @@ def render(
     lens: dict[str, Any] = {"field_of_view": field_of_view, "size": (rows, columns)}
     how: dict[str, Any] = {"shadows": shadows, "samples": samples, "supersample": supersample, "background": background}
     if thing:
-        if shape != "sphere" or maps_file or compare:
-            raise ParameterError(f"{thing} has a shape of its own: --shape, --maps and --compare go without.")
-        held = _held(thing, eye, shadows, confidence is not None)
+        if maps_file or compare:
+            raise ParameterError(f"{thing} is summed over the light: --maps and --compare go without.")
+        if not shape and repeat != 1:
+            raise ParameterError(f"{thing} is relit as it was photographed: --repeat wants a --shape.")
+        held = _held(thing, shape, eye, shadows, confidence is not None)
         lit = _light(light, layout, orientation, sun)
-        image, trusted = _relit(held, lit, eye, lens, how, confidence is not None)
+        if shape:
+            assert isinstance(held, gn.Relightable)
+            scene, camera = _before(shape, eye, lens, relief, smooth, y_up, repeat)
+            image, trusted = _anew(scene, held.material, lit, camera, how, confidence is not None)
+        else:
+            image, trusted = _relit(held, lit, eye, lens, how, confidence is not None)
         write(output, image, exposure, curve)
         typer.echo(str(output))
         if confidence:
@@ -94,14 +106,7 @@ def render(
         raise ParameterError("--confidence is of what was fitted: it goes with a .gonio of gonio share.")
     material = parse.reflectance(brdf)
     arriving = None if maps_file and not light and not sun and not compare else _light(light, layout, orientation, sun)
-    scene, centre, radius = shape_of(shape, relief, smooth, y_up)
-    towards = parse.vector(eye or "2.6,-3.2,1.6")
-    camera = gn.Pinhole.look_at(
-        eye=[c + radius * e for c, e in zip(centre, towards, strict=True)],
-        target=centre,
-        up=(0, 0, 1) if any(towards[:2]) else (0, 1, 0),  # from straight above, as a map lies
-        **lens,
-    )
+    scene, camera = _before(shape or "sphere", eye, lens, relief, smooth, y_up, repeat)
     quick = None
     if maps_file or compare:
         quick = _by_maps(maps_file, arriving, material, scene, camera, supersample, background)
@@ -117,17 +122,36 @@ def render(
     typer.echo(str(output))
 
 
-def _held(path: Path, eye: str, shadows: bool, confidence: bool) -> Relightable | Precomputed:
+def _before(
+    name: str, eye: str, lens: dict[str, Any], relief: float, smooth: bool, y_up: bool, repeat: int
+) -> tuple[Shape, Pinhole]:
+    """The shape of that name, its texture repeated, and the camera at `eye`."""
+    import gonio as gn
+
+    scene, centre, radius = shape_of(name, relief, smooth, y_up)
+    towards = parse.vector(eye or "2.6,-3.2,1.6")
+    camera = gn.Pinhole.look_at(
+        eye=[c + radius * e for c, e in zip(centre, towards, strict=True)],
+        target=centre,
+        up=(0, 0, 1) if any(towards[:2]) else (0, 1, 0),  # from straight above, as a map lies
+        **lens,
+    )
+    return scene if repeat == 1 else gn.Repeated(scene, repeat), camera
+
+
+def _held(path: Path, shape: str, eye: str, shadows: bool, confidence: bool) -> Relightable | Precomputed:
     """What a .gonio holds, if it can be shown as it is asked for."""
     import gonio as gn
     from gonio.errors import ParameterError
     from gonio.files.archive import kind_of
 
     if kind_of(path) == "precomputed":
-        if eye or shadows or confidence:
-            raise ParameterError(f"{path} holds images of one view: --eye, --shadows and --confidence go without.")
+        if shape or eye or shadows or confidence:
+            raise ParameterError(
+                f"{path} holds images of one view: --shape, --eye, --shadows and --confidence go without."
+            )
         return gn.read_precomputed(path)
-    if shadows and not eye:
+    if shadows and not eye and not shape:
         raise ParameterError(f"{path} is relit as it was photographed: --shadows wants an --eye, as 0,0,4.")
     return gn.read_relightable(path)
 
@@ -145,17 +169,29 @@ def _relit(
 
     if isinstance(held, gn.Precomputed):
         return held.relight(light), None
+    if eye:
+        return _anew(held.surface, held.material, light, _around(held, eye, lens), how, with_confidence)
     with bar("render") as progress:
-        if eye:
-            camera = _around(held, eye, lens)
-            image = gn.render(held.surface, held.material, light, camera, progress=progress, **how)
-            held = gn.Relightable(held.surface.view(camera), held.material)
-        else:
-            image = gn.relight(held, light, how["samples"], progress)
-    if not with_confidence:
-        return image, None
+        image = gn.relight(held, light, how["samples"], progress)
+    return image, _trusted(held, light) if with_confidence else None
+
+
+def _anew(
+    scene: Shape, material: BRDF, light: Light, camera: Pinhole, how: dict[str, Any], with_confidence: bool
+) -> tuple[np.ndarray, np.ndarray | None]:
+    """The image of `scene` with `material`, and how far to trust it where that is asked."""
+    import gonio as gn
+
+    with bar("render") as progress:
+        image = gn.render(scene, material, light, camera, progress=progress, **how)
+    return image, _trusted(gn.Relightable(scene.view(camera), material), light) if with_confidence else None
+
+
+def _trusted(held: Relightable, light: Light) -> np.ndarray:
+    import gonio as gn
+
     with bar("confidence") as progress:
-        return image, gn.relit_confidence(held, light, progress=progress)
+        return gn.relit_confidence(held, light, progress=progress)
 
 
 def _around(seen: Relightable, eye: str, lens: dict[str, Any]) -> Pinhole:
@@ -231,8 +267,9 @@ def shape_of(name: str, relief: float, smooth: bool, y_up: bool) -> tuple[Any, l
     if name == "sphere":
         return gn.Sphere(), [0.0, 0.0, 0.0], 1.0
     shape: Any
-    if name == "vase":
-        shape = gn.vase()
+    made = {"vase": gn.vase, "cloth": gn.cloth, "cylinder": gn.cylinder}
+    if name in made:
+        shape = made[name]()
     elif Path(name).suffix.lower() in MESHES:
         shape = gn.read_mesh(name)
         if smooth:

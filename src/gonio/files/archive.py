@@ -40,7 +40,7 @@ def write_archive(
         archive.writestr(_entry(_MANIFEST), manifest)
         for name, array in arrays.items():
             buffer = io.BytesIO()
-            np.lib.format.write_array(buffer, np.ascontiguousarray(array), allow_pickle=False)
+            np.lib.format.write_array(buffer, np.asarray(array, order="C"), allow_pickle=False)
             archive.writestr(_entry(f"{name}.npy"), buffer.getvalue())
 
 
@@ -59,6 +59,13 @@ def read_archive(
                 arrays[name.removesuffix(".npy")] = array = _array(path, archive, entry, left)
                 left -= array.nbytes
     return fields, arrays
+
+
+def required(path: str | os.PathLike[str], arrays: dict[str, np.ndarray], name: str) -> np.ndarray:
+    """One of a file's arrays. Raises `FileError` where it has none of that name."""
+    if name not in arrays:
+        raise FileError(f"{path}: {name}.npy is missing.")
+    return arrays[name]
 
 
 def kind_of(path: str | os.PathLike[str]) -> str:

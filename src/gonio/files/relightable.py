@@ -1,9 +1,11 @@
-"""What reflectance sharing found of one view, in .gonio files (`archive.py`): kind "relightable".
+"""What reflectance sharing or microfacet synthesis found of one view, in .gonio files (`archive.py`): "relightable".
 
-gonio.json      made; terms: [{logarithm, folded, flat, rho, reach}, ...], the Radial models that add up
+gonio.json      made; terms: [{logarithm, folded, flat, rho, reach}, ...], the Radial models that add up, and mixtures
+                of facets, {model: "facets", ...}, with arrays of their own (`facets.py`)
 term-K-NAME.npy centres (N, d), scales (d,), coefficients (N, C), polynomial (d + 1, C), limits (2, C), of term K;
                 samples (K, d), sample-scales (d,) where they are known, with reach: its coverage;
-                x, y (rows, columns) where it is spatial; factor (rows, columns, C) or (C,) where it is scaled
+                x, y (rows, columns) where it is spatial; factor (rows, columns, C) or (C,) where it is scaled, also of
+                facets
 NAME.npy        mask (rows, columns) bool; position, lifted, normal, tangent, wo (sites, 3) of the mask, along its rows
 vertices, faces, uv.npy    of the shape, where it is known
 residual-directions (N, 3), residual-images (N, sites, 3), in half floats, times residuals: {reach, noise, scale} of
@@ -20,6 +22,7 @@ import numpy as np
 from ..arrays import to_numpy
 from ..brdf.combine import Scaled, Sum
 from ..brdf.coverage import Coverage
+from ..brdf.facet_mixture import FacetMixture
 from ..brdf.model import BRDF
 from ..brdf.radial import Interpolant, Radial
 from ..errors import FileError, GonioError
@@ -27,7 +30,8 @@ from ..rendering.relight import Relightable
 from ..rendering.residuals import Residuals
 from ..shapes.mesh import Mesh
 from ..shapes.view import View
-from .archive import read_archive, write_archive
+from .archive import read_archive, required, write_archive
+from .facets import MODEL, facet_term, read_facet_term
 
 _KIND, _VERSION = "relightable", 1
 _VIEW = ("position", "lifted", "normal", "tangent", "wo")
@@ -38,15 +42,22 @@ _INTERPOLANT = ("centres", "scales", "coefficients", "polynomial")
 def write_relightable(path: str | os.PathLike[str], thing: Relightable, made: str = "") -> None:
     """Write `thing`, with words on how it was made, whole or not at all.
 
-    Raises `FileError` where its material is another than Radial models, scaled or not, and their sums.
+    Raises `FileError` where its material is another than Radial models and FacetMixtures, scaled or not, and their
+    sums.
     """
-    terms, arrays = [], {}
+    terms: list[dict[str, Any]] = []
+    arrays: dict[str, np.ndarray] = {}
     for k, term in enumerate(thing.material.terms if isinstance(thing.material, Sum) else (thing.material,)):
         if isinstance(term, Scaled):
             arrays[f"term-{k}-factor"] = to_numpy(term.factor)
             term = term.model
+        if isinstance(term, FacetMixture):
+            entry, own = facet_term(path, k, term)
+            terms.append(entry)
+            arrays |= own
+            continue
         if not isinstance(term, Radial):
-            raise FileError(f"{path}: a {type(term).__name__} is not written; Radial models are.")
+            raise FileError(f"{path}: a {type(term).__name__} is not written; Radial models and FacetMixtures are.")
         terms.append({name: getattr(term, name) for name in _FLAGS} | {"rho": term.interpolant.rho})
         if term.coverage is not None:
             terms[-1]["reach"] = term.coverage.reach
@@ -80,11 +91,14 @@ def read_relightable(path: str | os.PathLike[str]) -> Relightable:
     if not isinstance(terms, list) or not terms:
         raise FileError(f"{path}: the field 'terms' is no list of one or more.")
     try:
-        models = tuple(_term(path, k, term, arrays) for k, term in enumerate(terms))
-        material = models[0] if len(models) == 1 else Sum(models)
+        models = []
+        for k, term in enumerate(terms):
+            factor, model = arrays.get(f"term-{k}-factor"), _term(path, k, term, arrays)
+            models.append(model if factor is None else Scaled(model, factor))
+        material = models[0] if len(models) == 1 else Sum(tuple(models))
         shape = None
         if "vertices" in arrays:
-            vertices, faces = (_array(path, arrays, name) for name in ("vertices", "faces"))
+            vertices, faces = (required(path, arrays, name) for name in ("vertices", "faces"))
             shape = Mesh(vertices, faces, arrays.get("uv"))
         return Relightable(_view(path, arrays), material, shape, _residuals(path, fields, arrays))
     except FileError:
@@ -94,9 +108,13 @@ def read_relightable(path: str | os.PathLike[str]) -> Relightable:
 
 
 def _term(path: str | os.PathLike[str], k: int, term: Any, arrays: dict[str, np.ndarray]) -> BRDF:
+    if isinstance(term, dict) and "model" in term:
+        if term["model"] != MODEL:
+            raise FileError(f"{path}: terms[{k}] has model = {term['model']!r:.40}; '{MODEL}' is known, or none.")
+        return read_facet_term(path, k, term, arrays)
     if not isinstance(term, dict) or not all(isinstance(term.get(name), bool) for name in _FLAGS):
         raise FileError(f"{path}: terms[{k}] is {term!r:.80}; it has {', '.join(_FLAGS)}, each true or false.")
-    own = {name: _array(path, arrays, f"term-{k}-{name}") for name in _INTERPOLANT}
+    own = {name: required(path, arrays, f"term-{k}-{name}") for name in _INTERPOLANT}
     rho = term.get("rho", 0.0)  # older files have none
     if not isinstance(rho, float | int) or isinstance(rho, bool):
         raise FileError(f"{path}: terms[{k}] has rho = {rho!r:.40}; a number is wanted.")
@@ -106,16 +124,14 @@ def _term(path: str | os.PathLike[str], k: int, term: Any, arrays: dict[str, np.
         reach = term.get("reach")
         if not isinstance(reach, float):
             raise FileError(f"{path}: terms[{k}] has reach = {reach!r:.40}; a number is wanted where it has samples.")
-        coverage = Coverage(samples, _array(path, arrays, f"term-{k}-sample-scales"), reach)
-    model: BRDF = Radial(
+        coverage = Coverage(samples, required(path, arrays, f"term-{k}-sample-scales"), reach)
+    return Radial(
         interpolant,
         coverage=coverage,
         x=arrays.get(f"term-{k}-x"),
         y=arrays.get(f"term-{k}-y"),
         **{name: term[name] for name in _FLAGS},
     )
-    factor = arrays.get(f"term-{k}-factor")
-    return model if factor is None else Scaled(model, factor)
 
 
 def _residuals(path: str | os.PathLike[str], fields: dict[str, Any], arrays: dict[str, np.ndarray]) -> Residuals | None:
@@ -126,16 +142,16 @@ def _residuals(path: str | os.PathLike[str], fields: dict[str, Any], arrays: dic
     if not isinstance(told, dict) or not all(type(told.get(name)) in (int, float) for name in names):
         raise FileError(f"{path}: the field 'residuals' is {told!r:.80}; it has {', '.join(names)}, numbers.")
     reach, noise, scale = (float(told[name]) for name in names)
-    images = _array(path, arrays, "residual-images").astype(np.float32) * scale
-    return Residuals(_array(path, arrays, "residual-directions"), images, reach, noise)
+    images = required(path, arrays, "residual-images").astype(np.float32) * scale
+    return Residuals(required(path, arrays, "residual-directions"), images, reach, noise)
 
 
 def _view(path: str | os.PathLike[str], arrays: dict[str, np.ndarray]) -> View:
-    mask = _array(path, arrays, "mask")
+    mask = required(path, arrays, "mask")
     if mask.ndim != 2 or mask.dtype != np.bool_:
         raise FileError(f"{path}: mask.npy is {mask.dtype} {mask.shape}; pixels of bool are wanted.")
     count = int(np.count_nonzero(mask))
-    of = {name: _array(path, arrays, name).astype(np.float64) for name in _VIEW}
+    of = {name: required(path, arrays, name).astype(np.float64) for name in _VIEW}
     for name, array in of.items():
         if array.shape != (count, 3) or not np.isfinite(array).all():
             raise FileError(f"{path}: {name}.npy has shape {array.shape}, or is not finite; {(count, 3)} is wanted.")
@@ -148,9 +164,3 @@ def _view(path: str | os.PathLike[str], arrays: dict[str, np.ndarray]) -> View:
     rows, columns = mask.shape
     uv = np.stack(((column + 0.5) / columns, 1 - (row + 0.5) / rows), axis=-1)
     return View.of(mask, geometric=of["normal"], uv=uv, distance=np.zeros(count), **of)
-
-
-def _array(path: str | os.PathLike[str], arrays: dict[str, np.ndarray], name: str) -> np.ndarray:
-    if name not in arrays:
-        raise FileError(f"{path}: {name}.npy is missing.")
-    return arrays[name]

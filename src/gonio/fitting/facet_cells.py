@@ -97,7 +97,10 @@ def _lattice(measured: Measured, tolerance: float) -> Cells:
     low, high = local[:, :2].min(axis=0), local[:, :2].max(axis=0)
 
     def lattice(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        u, v = (np.linspace(a, b, n) if n > 1 else np.array([(a + b) / 2]) for a, b, n in zip(low, high, counts, strict=True))
+        u, v = (
+            np.linspace(a, b, n) if n > 1 else np.array([(a + b) / 2])
+            for a, b, n in zip(low, high, counts, strict=True)
+        )
         x = np.stack(np.meshgrid(u, v, indexing="ij"), axis=-1).reshape(-1, 2)
         x = np.column_stack((x, np.full(len(x), local[:, 2].mean())))
         return measured.directions(origin + x @ frame, np.broadcast_to(frame, (len(x), 3, 3)))
@@ -118,7 +121,12 @@ def _lattice(measured: Measured, tolerance: float) -> Cells:
         (i, j), (u, v) = corner[sites[0]], part[sites].T
         beside = [(i + a, j + b) for a in range(min(2, counts[0])) for b in range(min(2, counts[1]))]
         shares = np.stack(
-            [(u if a > i else 1 - u if counts[0] > 1 else 1) * (v if b > j else 1 - v if counts[1] > 1 else 1 + 0 * v) for a, b in beside], axis=1
+            [
+                (u if a > i else 1 - u if counts[0] > 1 else 1)
+                * (v if b > j else 1 - v if counts[1] > 1 else 1 + 0 * v)
+                for a, b in beside
+            ],
+            axis=1,
         )
         cells.append(Cell(sites, np.array([a * counts[1] + b for a, b in beside]), shares))
     return Cells(wi, wo, tuple(cells))

@@ -50,7 +50,9 @@ def estimate_index(
             told += best.second >= 0
             for low in range(0, len(tables), _BLOCK):
                 some = np.arange(low, min(low + _BLOCK, len(tables)))
-                off[:, some] += _apart(tables, confidence, cosines, grid, start, best, some[best.second[some] >= 0], some)
+                off[:, some] += _apart(
+                    tables, confidence, cosines, grid, start, best, some[best.second[some] >= 0], some
+                )
         eta = _least(np.where(told > 0, off, off.sum(axis=1, keepdims=True)))
     return eta
 
@@ -81,7 +83,10 @@ def _apart(
     weight = W * grid.solid_angles[:, None].astype(np.float32)
     inside = (W > 0) * grid.solid_angles[:, None].astype(np.float32)
     c = [x.astype(np.float32) for x in (cosines[own], cosines[place])]
-    D = [np.where(W > 0, x, 0).astype(np.float32) * facing(start, y) for x, y in zip((tables[own], tables[place]), c, strict=True)]
+    D = [
+        np.where(W > 0, x, 0).astype(np.float32) * facing(start, y)
+        for x, y in zip((tables[own], tables[place]), c, strict=True)
+    ]
     for k, eta in enumerate(_CANDIDATES):
         a, b = (x / facing(np.float32(eta), y) for x, y in zip(D, c, strict=True))
         for x in (a, b):

@@ -109,9 +109,7 @@ class FacetSlices:
         return v
 
 
-def blended_slices(
-    nodes: Sequence[FacetSlices], shares: Array, rho: Array, known: Array | None = None
-) -> np.ndarray:
+def blended_slices(nodes: Sequence[FacetSlices], shares: Array, rho: Array, known: Array | None = None) -> np.ndarray:
     """Slices (T, rows, columns), float32, of texels between `nodes`, which have `shares` (T, nodes) of sum 1: NaN
     outside what the domains of all nodes hold. `rho`, `known` and errors as of `FacetSlices`."""
     values, b = to_numpy(rho), to_numpy(shares).astype(np.float32)

@@ -13,9 +13,10 @@ blocks of sites: what is kept of each is half floats of its partial D. Not here:
 from __future__ import annotations
 
 import dataclasses
+import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any
+from pathlib import Path
 
 import numpy as np
 
@@ -26,12 +27,12 @@ from ..brdf.polar_grid import PolarGrid
 from ..directions import normalise
 from ..errors import MEMORY_LIMIT, ArrayError, MemoryLimitError, ParameterError
 from ..reflection import processors
-from .facet_cells import Cell, Cells, Measured, Slices
+from .facet_cells import Cells, Measured, Slices
 from .facet_domain import Domain
 from .facet_index import estimate_index, facing
 from .facet_slices import FacetSlices, blended_slices
 from .model import Fit
-from .partial_ndf import fit_partial_ndfs
+from .partial_ndf import Symmetric, fit_partial_ndfs
 from .representatives import Representatives, choose_representatives
 from .synthesis import CompletedNDFs, complete_ndfs
 
@@ -68,6 +69,7 @@ def synthesise_ndfs(
     tolerance: float = 0.04,
     seed: int = 0,
     threads: int | None = None,
+    folder: str | os.PathLike[str] | None = None,
     progress: Progress | None = None,
 ) -> Fit[SynthesisedNDFs]:
     """The facets of all sites of `measured`: `capture.reflectance()` of a flat sample under many lights.
@@ -76,7 +78,8 @@ def synthesise_ndfs(
     sites where None, which are made whole; twice as many take four times as long and bring the error down by a fifth.
     eta: the refractive index, found where None. paper: MS 15 as printed for the distance, and others averaged into a
     distribution's own data (MS 16). tolerance: radians by which half vectors may differ between the nodes at which
-    operators are made. threads: all processors where None. progress(step, done, total).
+    operators are made. threads: all processors where None. folder: where partial distributions are kept, 3 KB a site; a
+    run that was stopped goes on from them. progress(step, done, total).
 
     Raises `ArrayError` where lights are too few or sites have no domain in common, `ParameterError` for settings that
     are out of range, `MemoryLimitError` before more memory is taken than the limit.
@@ -90,11 +93,15 @@ def synthesise_ndfs(
 
     workers = processors() if threads is None else threads
     partial = _Partial(measured, grid, tolerance, _INDEX if eta is None else eta, workers)
-    values = partial.values(hear("partial distributions"))
+    values = partial.values(None if folder is None else Path(folder), hear("partial distributions"))
     chosen = choose_representatives(
-        lambda low, high: values[low:high].astype(np.float32), len(measured), representatives, seed, hear("representatives")
+        lambda low, high: values[low:high] * partial.weights,
+        len(measured),
+        representatives,
+        seed,
+        hear("representatives"),
     )
-    few = partial.of(chosen.texels)
+    few = partial.of(values, chosen.texels)
     index = np.full(len(chosen.texels), _INDEX if eta is None else eta)
     if eta is None:
         index = estimate_index(few.tables, few.confidence, few.cosines, grid, _INDEX)
@@ -126,42 +133,43 @@ def _trust(confidence: np.ndarray, completed: CompletedNDFs) -> np.ndarray:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class _Few:
-    """Partial distributions of n sites: `tables`, `confidence`, and `cosines` h.o, (n, rows, columns); what shines,
-    `rho`, the same; wo (n, 3)."""
+    """Partial distributions of n sites: `fitted` (n, rows, columns) with one index, `tables` the same with `eta` (n,),
+    their `confidence`, and wo (n, 3)."""
 
     grid: PolarGrid
+    fitted: np.ndarray
     tables: np.ndarray
-    rho: np.ndarray
     confidence: np.ndarray
     wo: np.ndarray
-    index: np.ndarray
+    eta: np.ndarray
 
     @property
     def cosines(self) -> np.ndarray:
-        return np.clip(np.einsum("rcd,nd->nrc", self.grid.directions, self.wo), 0, 1)
+        """h.o (n, rows, columns)."""
+        return np.clip(np.einsum("rcd,nd->nrc", self.grid.directions, self.wo), 0, 1).astype(np.float32)
 
-    def indexed(self, index: np.ndarray) -> _Few:
+    def indexed(self, eta: np.ndarray) -> _Few:
         """The same with another eta (n,): D is divided by what F rises."""
-        scale = facing(self.index[:, None, None], self.cosines) / facing(index[:, None, None], self.cosines)
-        return dataclasses.replace(self, tables=self.tables * scale, index=index)
+        before, now = (facing(x[:, None, None], self.cosines) for x in (self.eta, eta))
+        return dataclasses.replace(self, tables=(self.tables * (before / now)).astype(np.float32), eta=eta)
 
-    def refitted(self, tables: np.ndarray) -> np.ndarray:
-        """Whole `tables` with a site's own data found anew (MS 11), with the areas of what is whole (MS 5)."""
+    def refitted(self, whole: np.ndarray) -> np.ndarray:
+        """`whole` tables with a site's own data as MS 11 finds them with the areas of what is whole (MS 5), in the place
+        of those of D completed by its turn (`partial_ndf`)."""
         areas = FacetAreas(self.grid, _degree(self.grid))
-        found = tables.astype(np.float64)
-        mass = self.grid.projected[:, None]
-        for k in range(len(found)):
-            own = self.confidence[k] > 0
-            h = self.grid.directions[own]
-            c = h @ self.wo[k]
-            i = 2 * c[:, None] * h - self.wo[k]
-            directions = np.vstack((i, self.wo[k]))
-            g = np.maximum(areas.areas(areas.coefficients(found[k]), directions), directions[:, 2])
-            D = self.rho[k][own] * g[:-1] / facing(self.index[k], np.clip(c, 0, 1))
-            m = np.broadcast_to(mass, own.shape)[own]
-            before, now = float(np.sum(m * found[k][own])), float(np.sum(m * D))
-            if now > 0:
-                found[k][own] = D * (before / now)
+        found, mass = whole.astype(np.float32), np.broadcast_to(self.grid.projected[:, None], self.grid.shape)
+        for k, confidence in enumerate(self.confidence):
+            own = confidence > 0
+            first = np.append(0, self.fitted[k].ravel())[Symmetric().sources(own) + 1]
+            domain = Domain(self.grid, self.wo[k], own)
+            i = domain.lights[own]
+            g = [
+                np.maximum(areas.areas(areas.coefficients(D / np.sum(D * mass)), i), i[:, 2]) for D in (first, whole[k])
+            ]
+            D = self.tables[k][own] * g[1] / g[0]
+            total = float(np.sum(mass[own] * D))
+            if total > 0:
+                found[k][own] = D * (float(np.sum(mass[own] * whole[k][own])) / total)
         return found
 
 
@@ -186,73 +194,102 @@ class _Partial:
                 f"the facets that all sites show are {np.sum(solid * self.common) / usual:.0%} of what one shows: lights "
                 "are too near, or the sample too large or curved. Take a part of it (a mask), or lights farther away."
             )
+        self.somewhere = np.logical_or.reduce(self.lit)
         W = np.mean([domain.confidence for domain in self.domains], axis=0)
-        self.weights = np.sqrt(W * solid)[self.common].astype(np.float32)
+        # MS 15 weighs squares by W and solid angle; what is not common to all does not count.
+        self.weights = np.where(self.common, np.sqrt(W * solid), 0)[self.somewhere].astype(np.float32)
         self._operators: dict[int, FacetSlices] = {}
 
-    def values(self, hear: Callable[[int, int], None]) -> np.ndarray:
-        """(S, K), half floats: D at the knots that all sites show, weighted as MS 15 weighs."""
-        count, width = len(self.measured), len(self.weights)
-        if 2 * count * width > MEMORY_LIMIT:
-            raise MemoryLimitError(
-                f"partial distributions of {count:,} sites need {2e-9 * count * width:.1f} GB of at most "
-                f"{MEMORY_LIMIT / 1e9:g}: take a part of the sample, or a coarser grid."
-            )
-        values = np.empty((count, width), np.float16)
-        done = 0
-        for cell, (tables, _, _, _) in self._fitted(self.cells.cells):
-            values[cell.sites] = tables[:, self.common] * self.weights
-            done += len(cell.sites)
-            hear(done, count)
+    def values(self, folder: Path | None, hear: Callable[[int, int], None]) -> np.ndarray:
+        """D (S, K), half floats, at the knots that any site shows; in a file of `folder` where one is given."""
+        shape = len(self.measured), int(np.count_nonzero(self.somewhere))
+        need = 2 * shape[0] * shape[1]
+        if folder is None:
+            if need > MEMORY_LIMIT:
+                raise MemoryLimitError(
+                    f"partial distributions of {shape[0]:,} sites need {1e-9 * need:.1f} GB of at most "
+                    f"{MEMORY_LIMIT / 1e9:g}: name a folder to keep them in, or take a part of the sample."
+                )
+            values, begun = np.empty(shape, np.float16), np.zeros(len(self.cells.cells), bool)
+        else:
+            values, begun = _kept(folder, shape, len(self.cells.cells))
+        left = [k for k in range(len(begun)) if not begun[k]]
+        done = len(self.measured) - sum(len(self.cells.cells[k].sites) for k in left)
+        for k, tables in zip(left, self._fitted(left), strict=True):
+            sites = self.cells.cells[k].sites
+            values[sites] = tables[:, self.somewhere]
+            begun[k] = True
+            done += len(sites)
+            hear(done, len(self.measured))
         return values
 
-    def of(self, sites: np.ndarray) -> _Few:
+    def of(self, values: np.ndarray, sites: np.ndarray) -> _Few:
         """Those of some sites, in their order."""
-        wanted = np.full(len(self.measured), -1)
-        wanted[sites] = np.arange(len(sites))
-        cells = []
-        for cell in self.cells.cells:
-            mine = wanted[cell.sites] >= 0
-            if mine.any():
-                cells.append(Cell(cell.sites[mine], cell.nodes, cell.shares[mine]))
-        shape = (len(sites), *self.grid.shape)
-        tables, rho, confidence = (np.zeros(shape, np.float32) for _ in range(3))
-        wo = np.empty((len(sites), 3))
-        for cell, (found, slices, domain, _) in self._fitted(tuple(cells)):
-            at = wanted[cell.sites]
-            tables[at], rho[at], confidence[at], wo[at] = found, slices, domain.confidence, domain.wo
-        return _Few(self.grid, tables, rho, confidence, wo, np.full(len(sites), self.eta))
+        place = np.empty(len(self.measured), int)
+        for k, cell in enumerate(self.cells.cells):
+            place[cell.sites] = k
+        confidence, wo = np.zeros((len(sites), *self.grid.shape), np.float32), np.empty((len(sites), 3))
+        for k in np.unique(place[sites]):
+            mine = place[sites] == k
+            domain = self._domain(k)
+            confidence[mine], wo[mine] = domain.confidence, domain.wo
+        tables = np.zeros(confidence.shape, np.float32)
+        tables[:, self.somewhere] = values[sites]
+        tables = np.where(confidence > 0, tables, 0)
+        return _Few(self.grid, tables, tables, confidence, wo, np.full(len(sites), self.eta))
 
-    def _fitted(self, cells: tuple[Cell, ...]) -> Iterator[tuple[Cell, Any]]:
-        """Each cell with its tables, slices, domain and k_s, a few at a time."""
+    def _domain(self, k: int) -> Domain:
+        """Of all sites of cell k: seen as from amidst its nodes."""
+        cell = self.cells.cells[k]
+        wo = np.asarray(normalise(cell.shares.mean(axis=0) @ self.cells.wo[cell.nodes], "the mean of wo"))
+        return Domain(self.grid, wo, self.lit[k])
+
+    def _fitted(self, cells: list[int]) -> Iterator[np.ndarray]:
+        """Tables (sites, rows, columns) of each of the cells numbered so, a few at a time."""
         with ThreadPoolExecutor(self.workers) as pool:
             for low in range(0, len(cells), 8 * self.workers):
                 some = cells[low : low + 8 * self.workers]
-                for k in {int(k) for cell in some for k in cell.nodes}:
-                    self._operator(k)
-                yield from zip(some, pool.map(self._fit, some), strict=True)
+                wanted = sorted({int(n) for k in some for n in self.cells.cells[k].nodes} - set(self._operators))
+                made = dict(zip(wanted, pool.map(self._made, wanted), strict=True))
+                for number in list(self._operators)[: max(len(self._operators) + len(made) - _KEPT, 0)]:
+                    if not any(number in self.cells.cells[k].nodes for k in some):
+                        self._operators.pop(number)
+                self._operators |= made
+                yield from pool.map(self._fit, some)
 
-    def _operator(self, k: int) -> FacetSlices:
-        if k not in self._operators:
-            if len(self._operators) >= _KEPT:
-                self._operators.pop(next(iter(self._operators)))
-            self._operators[k] = FacetSlices(self.domains[k], self.cells.wi[k])
-            _ = self._operators[k].weights
-        return self._operators[k]
+    def _made(self, number: int) -> FacetSlices:
+        slices = FacetSlices(self.domains[number], self.cells.wi[number])
+        _ = slices.weights
+        return slices
 
-    def _fit(self, cell: Cell) -> tuple[np.ndarray, np.ndarray, Domain, np.ndarray]:
+    def _fit(self, k: int) -> np.ndarray:
+        cell, domain = self.cells.cells[k], self._domain(k)
         measured = self.measured.at(cell.sites)
-        nodes = [self._operator(int(k)) for k in cell.nodes]
-        wo = np.asarray(normalise(measured.wo.astype(np.float64).mean(axis=0), "the mean of wo"))
-        lit = np.logical_and.reduce([node.domain.confidence > 0 for node in nodes])
-        domain = Domain(self.grid, wo, lit)
         rho = measured.value.mean(axis=-1)
         known = np.isfinite(rho)
         shine = np.maximum(np.where(known, rho, 0) - diffuse(measured).mean(axis=1, keepdims=True) / np.pi, 0)
-        slices = np.where(domain.confidence > 0, blended_slices(nodes, cell.shares, shine, known), 0)
-        slices = np.nan_to_num(slices)
-        fit = fit_partial_ndfs(slices, domain, self.eta, degree=_degree(self.grid))
-        return fit.tables, slices, domain, fit.k_s
+        nodes = [self._operators[int(number)] for number in cell.nodes]
+        slices = blended_slices(nodes, cell.shares, shine, known)
+        return fit_partial_ndfs(slices, domain, self.eta, degree=_degree(self.grid)).tables
+
+
+def _kept(folder: Path, shape: tuple[int, int], cells: int) -> tuple[np.ndarray, np.ndarray]:
+    """What an earlier run left in `folder` of as many sites, knots and cells, or nothing yet."""
+    folder.mkdir(parents=True, exist_ok=True)
+    arrays = []
+    for name, size, dtype in (("partial.npy", shape, np.float16), ("done.npy", (cells,), np.bool_)):
+        path = folder / name
+        if path.exists():
+            array = np.load(path, mmap_mode="r+", allow_pickle=False)
+            if array.shape != size or array.dtype != dtype:
+                raise ArrayError(
+                    f"{path} is of another sample: {array.dtype} {array.shape}, not {size}. Remove {folder}, or name "
+                    "another folder."
+                )
+        else:
+            array = np.lib.format.open_memmap(path, "w+", dtype, size)
+        arrays.append(array)
+    return arrays[0], arrays[1]
 
 
 def diffuse(measured: Slices, percentile: float = _PERCENTILE) -> np.ndarray:

@@ -8,25 +8,32 @@ until D is known wherever any of them is known at some turn. A distribution's ow
 MS 16 would average into them is of others. The little that no turn tells is filled: by the turn of pi, else by the mean
 of the ring, and beyond the outermost ring by the ring itself.
 
-The search is exhaustive (`turned`), over all distributions and turns. Not here: which distributions stand for all
-(`representatives`).
+The search is exhaustive, over all distributions and turns (`turned`), up to 1,024 of them. Beyond, each is compared with
+all once, and then, as it grows, with those alone that were nearest at some turn. Not here: which distributions stand
+for all (`representatives`).
 """
 
 from __future__ import annotations
 
 import dataclasses
+import itertools
 from collections.abc import Callable
 
 import numpy as np
 
-from ..arrays import Array, require_finite, to_numpy
+from ..arrays import Array, to_numpy
 from ..brdf.polar_grid import PolarGrid
-from ..errors import ArrayError, ParameterError
+from ..errors import ArrayError
 from .turnable import Turnable
-from .turned import best_turns
+from .turned import best_turns, nearest_turns
 
 _ENOUGH = 0.01  # of what could be known, unknown yet
-_MERGERS = 12
+_MERGERS = 16
+_EXHAUSTIVE = 1024
+_RANGES = 12  # of turns
+_CANDIDATES = 4  # of each range
+_LOW = 0.2  # of a domain within the other at the least, among candidates
+_ADDS = 0.995  # of a partner's domain, at most, is known already
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -63,38 +70,60 @@ def complete_ndfs(
     Raises `ArrayError` where they do not fit, are negative, or not finite where known.
     """
     D, W = _checked(tables, confidence, grid)
-    n = len(D)
-    partial = Turnable.of(D, W, grid, np.float32)
-    known, own = W.copy(), W > 0
-    D = np.where(own, D, 0)
+    n, own = len(D), W > 0
+    D = np.where(own, D, 0).astype(np.float32)
+    partial = _Tables(D.copy(), W.astype(np.float32), grid)
+    known = partial.W.copy()
     # Columns do not matter at all turns: a ring is told of if any of them is, of any distribution.
-    could = np.broadcast_to((W > 0).any(axis=(0, 2))[:, None], grid.shape)
+    could = np.broadcast_to(own.any(axis=(0, 2))[:, None], grid.shape)
     w = grid.solid_angles[:, None]
-    partners = []
+    candidates = None
+    total = _MERGERS * n
+    if n > _EXHAUSTIVE:
+        total += 8 * n
+
+        def hear(done: int, of: int) -> None:
+            if progress is not None:
+                progress(8 * done, total)
+
+        common = Turnable.of(D, np.where(own.all(axis=0), W.min(axis=0), 0), grid, np.float32)
+        steps = np.linspace(1, grid.columns, _RANGES + 1).astype(int)
+        near = nearest_turns(
+            common,
+            common,
+            _CANDIDATES,
+            list(itertools.pairwise(steps)),
+            (_LOW, _ADDS),
+            relative=relative,
+            progress=hear,
+        )
+        candidates = np.concatenate([x.second for x in near], axis=1)
+    each = Turnable.of(partial.D, partial.W, grid, np.float32)
+    partners: list[np.ndarray] = []
+    open_ = np.arange(n)
     for merger in range(_MERGERS):
-        missing = np.sum(w * (could & ~(known > 0)), axis=(1, 2)) > _ENOUGH * np.sum(w * could)
-        open_ = np.flatnonzero(missing)
+        missing = np.sum(w * (could & ~(known[open_] > 0)), axis=(1, 2)) > _ENOUGH * np.sum(w * could)
+        open_ = open_[missing]
         if not len(open_):
             break
-        found = _searched(D[open_], known[open_], partial, grid, overlap, relative)
-        merged = found[:, 0] >= 0
-        if not merged.any():
-            break
+        few = None if candidates is None else candidates[open_]
+        found = _nearest(Turnable.of(D[open_], known[open_], grid, np.float32), each, few, overlap, relative)
+        told = found[:, 0] >= 0
+        open_, found = open_[told], found[told]
+        D[open_], known[open_] = partial.merged(D[open_], known[open_], found, own[open_] if keep_own else None)
         step = np.full((n, 2), -1)
         step[open_] = found
         partners.append(step)
-        at = open_[merged]
-        _merge(D, known, at, step[at], tables=np.where(W > 0, to_numpy(tables), 0), W=W, own=own if keep_own else None, w=w)
         if progress is not None:
-            progress(merger + 1, _MERGERS)
+            progress(total - (_MERGERS - merger - 1) * n, total)
     mass = grid.projected[:, None]
-    told = known > 0
-    _fill(D, told, grid)
-    total = np.sum(D * mass, axis=(1, 2))
-    total = np.where(total > 0, total, 1)
-    parts = (np.sum(np.where(where, D, 0) * mass, axis=(1, 2)) / total for where in (own, told))
+    data = known > 0
+    _fill(D, data, grid)
+    sums = np.sum(D * mass, axis=(1, 2))
+    sums = np.where(sums > 0, sums, 1)
+    parts = (np.sum(np.where(where, D, 0) * mass, axis=(1, 2)) / sums for where in (own, data))
     return CompletedNDFs(
-        (D / total[:, None, None]).astype(np.float32), told, *parts, np.array(partners, int).reshape(-1, n, 2)
+        (D / sums[:, None, None]).astype(np.float32), data, *parts, np.array(partners, int).reshape(-1, n, 2)
     )
 
 
@@ -107,34 +136,46 @@ def _checked(tables: Array, confidence: Array, grid: PolarGrid) -> tuple[np.ndar
     return D, np.broadcast_to(W, D.shape)
 
 
-def _searched(D, W, partial, grid, overlap, relative) -> np.ndarray:
-    """(n, 2): partner and turn, -1 where there is none; of those that extend most where none is within the overlap."""
-    growing = Turnable.of(D, W, grid, np.float32)
-    best = best_turns(growing, partial, overlap, relative=relative)
+@dataclasses.dataclass(frozen=True, eq=False)
+class _Tables:
+    """Partial distributions D, 0 outside their domains, and W, (n, rows, columns), to be turned."""
+
+    D: np.ndarray
+    W: np.ndarray
+    grid: PolarGrid
+
+    def turned(self, which: np.ndarray, turn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """D and W of some (m,), each turned by so many columns."""
+        columns = (np.arange(self.grid.columns) - turn[:, None]) % self.grid.columns
+        place = which[:, None, None], np.arange(self.grid.rows)[:, None], columns[:, None]
+        return self.D[place], self.W[place]
+
+    def merged(
+        self, D: np.ndarray, W: np.ndarray, step: np.ndarray, own: np.ndarray | None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """D and W (MS 16, 17) with partners and turns `step` (m, 2); as they were where they are `own`."""
+        D2, W2 = self.turned(step[:, 0], step[:, 1])
+        both = self.grid.solid_angles[:, None] * ((W > 0) & (W2 > 0))
+        s1, s2 = (np.sum(d * both, axis=(1, 2)) for d in (D, D2))
+        scale = (s1 / np.where(s2 > 0, s2, 1)).astype(np.float32)[:, None, None]
+        sums = W + W2
+        merged = (W * D + scale * W2 * D2) / np.where(sums > 0, sums, 1)
+        return merged if own is None else np.where(own, D, merged), np.maximum(W, W2)
+
+
+def _nearest(
+    growing: Turnable, each: Turnable, candidates: np.ndarray | None, overlap: tuple[float, float], relative: bool
+) -> np.ndarray:
+    """(m, 2): the best of all, or of the `candidates` (m, count), and its turn; -1 where there is none. Where none lies
+    within the `overlap`, as when little is unknown, those count that add the least bit."""
+    best = best_turns(growing, each, overlap, relative=relative, partners=candidates)
     found = np.stack((best.second, best.turn), axis=1)
-    # Nearly whole, what is left is less than any partner's sixth.
     left = np.flatnonzero(best.second < 0)
     if len(left):
-        last = Turnable.of(D[left], W[left], grid, np.float32)
-        best = best_turns(last, partial, (overlap[0], 0.99), relative=relative)
-        found[left] = np.stack((best.second, best.turn), axis=1)
+        few = None if candidates is None else candidates[left]
+        last = best_turns(growing.part(left), each, (overlap[0], _ADDS), relative=relative, partners=few)
+        found[left] = np.stack((last.second, last.turn), axis=1)
     return found
-
-
-def _merge(D, known, at, step, *, tables, W, own, w) -> None:
-    columns = D.shape[2]
-    turned = (np.arange(columns) - step[:, 1:]) % columns
-    rows = np.arange(D.shape[1])
-    D2 = tables[step[:, 0, None, None], rows[:, None], turned[:, None]]
-    W2 = W[step[:, 0, None, None], rows[:, None], turned[:, None]]
-    D1, W1 = D[at], known[at]
-    both = (W1 > 0) & (W2 > 0)
-    s1, s2 = (np.sum(np.where(both, d, 0) * w, axis=(1, 2)) for d in (D1, D2))
-    scale = (s1 / np.where(s2 > 0, s2, 1))[:, None, None]
-    sums = W1 + W2
-    merged = (W1 * D1 + scale * W2 * D2) / np.where(sums > 0, sums, 1)
-    D[at] = merged if own is None else np.where(own[at], D1, merged)
-    known[at] = np.maximum(W1, W2)
 
 
 def _fill(D: np.ndarray, told: np.ndarray, grid: PolarGrid) -> None:

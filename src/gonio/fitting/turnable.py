@@ -78,6 +78,10 @@ class Turnable:
     def __len__(self) -> int:
         return len(self.D)
 
+    def part(self, some: np.ndarray) -> Turnable:
+        """Those numbered `some` (m,)."""
+        return dataclasses.replace(self, D=self.D[some], which=self.which[some])
+
     @property
     def columns(self) -> int:
         """As many turns there are."""

@@ -24,6 +24,7 @@ import dataclasses
 import functools
 import itertools
 import math
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -89,6 +90,7 @@ def best_turns(
     keep: int = 40,
     memory: int = 256_000_000,
     relative: bool = False,
+    partners: Array | None = None,
 ) -> Best:
     """The nearest of B turned distributions to each of A, of those whose domains lie between `overlap[0]` and
     `overlap[1]` within its own (MS 5.2 wants 50 to 85 %: likeness is told, and something is added).
@@ -96,7 +98,8 @@ def best_turns(
     relative: divide distances by the mean of (D1/s1)^2 + (D2/s2)^2, so that sharp facets are as far as dull ones.
     allowed: (A, B) False where a pair is excluded (itself, say). coarse: > 1 looks at means over so many rows by so
     many columns first, and then at the best `keep` of B as they are: among 1,600 cloths 4 finds the same for 99 % in
-    half of the time, among 400 nothing is gained. memory: bytes to use beside the transforms.
+    half of the time, among 400 nothing is gained. partners: (A, count) of B, -1 for none, where no others count, in the
+    place of `allowed` and `coarse`. memory: bytes to use beside the transforms.
 
     Raises `ArrayError` where grids, precisions or `allowed` do not fit, `ParameterError` for bounds that are no
     interval in [0, 1] and for other coarse and keep, `MemoryLimitError` where `memory` is too little for one pair.
@@ -115,6 +118,15 @@ def best_turns(
     if not min(shape):
         return best
     exact = _Pairs(first, second, memory, overlap, relative=relative)
+    if partners is not None:
+        given = np.sort(to_numpy(partners), axis=1)
+        if given.ndim != 2 or len(given) != shape[0] or given.max(initial=-1) >= shape[1]:
+            raise ArrayError(
+                f"partners have shape {given.shape}; ({shape[0]}, count) of 0 to {shape[1] - 1} is wanted."
+            )
+        given[:, 1:][given[:, 1:] == given[:, :-1]] = -1
+        exact.write_best(np.arange(shape[0]), np.maximum(given, 0), given >= 0, best)
+        return best
     looking = exact
     if coarse != 1:
         looking = _Pairs(first.coarser(coarse), second.coarser(coarse), memory, overlap, True, relative)
@@ -127,6 +139,62 @@ def best_turns(
         seen = np.isfinite(np.take_along_axis(least, partners, axis=1))
         exact.write_best(np.arange(a.start, a.stop), partners, seen, best)
     return best
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Nearest:
+    """For each of A the nearest partners, nearest first: `second` (A, count), -1 where there are no more; `turn` and
+    `distance` as of `Best`."""
+
+    second: np.ndarray
+    turn: np.ndarray
+    distance: np.ndarray
+
+
+def nearest_turns(
+    first: Turnable,
+    second: Turnable,
+    count: int,
+    ranges: Sequence[tuple[int, int]],
+    overlap: tuple[float, float] = (0.5, 0.85),
+    memory: int = 256_000_000,
+    relative: bool = False,
+    progress: Callable[[int, int], None] | None = None,
+) -> list[Nearest]:
+    """Of each range of turns, columns from the first to before the last, the `count` nearest of B to each of A, each of
+    them at its best turn; overlaps, errors and `relative` as of `best_turns`. progress(done, total): of A."""
+    require_alike(first, second)
+    low, high = overlap
+    if not 0 <= low <= high <= 1:
+        raise ParameterError(f"overlap = ({low:g}, {high:g}); an interval within [0, 1] is wanted.")
+    A, B = len(first), len(second)
+    count = min(count, B)
+    if count < 1:
+        raise ParameterError(f"count = {count}; one or more of {B} partners are wanted.")
+    found = [Nearest(np.full((A, count), -1), np.zeros((A, count), int), np.full((A, count), np.inf)) for _ in ranges]
+    pairs = _Pairs(first, second, memory, overlap, relative=relative)
+    for a in pairs.blocks(A):
+        both = _both(pairs.first.VD[a])
+        least = np.full((len(ranges), a.stop - a.start, B), np.inf, first.dtype)
+        turn = np.zeros(least.shape, int)
+        for b in pairs.blocks(B):
+            terms = pairs.terms(a, b)
+            d = pairs.distances(both, b, terms)
+            for k, ends in enumerate(ranges):
+                some = slice(*np.searchsorted(terms.planes, ends))
+                if len(planes := terms.planes[some]):
+                    best = d[some].argmin(axis=0)
+                    least[k, :, b] = np.take_along_axis(d[some], best[None], axis=0)[0]
+                    turn[k, :, b] = planes[best]
+        order = np.argpartition(least, count - 1, axis=2)[..., :count]
+        order = np.take_along_axis(order, np.take_along_axis(least, order, axis=2).argsort(axis=2), axis=2)
+        for k, nearest in enumerate(found):
+            nearest.distance[a] = np.take_along_axis(least[k], order[k], axis=1)
+            nearest.turn[a] = np.take_along_axis(turn[k], order[k], axis=1)
+            nearest.second[a] = np.where(np.isfinite(nearest.distance[a]), order[k], -1)
+        if progress is not None:
+            progress(a.stop, A)
+    return found
 
 
 class _Pairs:
@@ -293,11 +361,12 @@ def _correlations(x: np.ndarray, y: np.ndarray, turns: np.ndarray) -> np.ndarray
     side = _side(x.shape[-1])
     if x.shape[-3] <= side and y.shape[-3] <= side:
         return _turned(_both(x), y, turns)
-    found = np.empty((len(turns), x.shape[-3], y.shape[-3]), turns.dtype)
+    batch = np.broadcast_shapes(x.shape[:-3], y.shape[:-3])
+    found = np.empty((len(turns), *batch, x.shape[-3], y.shape[-3]), turns.dtype)
     for a in range(0, x.shape[-3], side):
-        both = _both(x[a : a + side])
+        both = _both(x[..., a : a + side, :, :])
         for b in range(0, y.shape[-3], side):
-            found[:, a : a + side, b : b + side] = _turned(both, y[b : b + side], turns)
+            found[..., a : a + side, b : b + side] = _turned(both, y[..., b : b + side, :, :], turns)
     return found
 
 

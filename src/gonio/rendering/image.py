@@ -171,10 +171,30 @@ def _seen(
 
         sites = view.frames[m], view.wo[m], view.lifted[m]
         visibility = arriving if shadows else None
-        looked_up = textured(material, None if view.uv is None else view.uv[m])
+        where = (None, None) if view.uv is None else (view.uv[m], _footprint(view.uv)[m])
+        looked_up = textured(material, *where)
         for source in sources:
             colour[m] += radiance(looked_up, source, *sites, visibility=visibility, budget=samples, threads=1)
     return colour
+
+
+def _footprint(uv: np.ndarray) -> np.ndarray:
+    """The root of the area in (u, v) between neighbouring rays (rows, columns), of their `uv` (rows, columns, 2).
+
+    Along rows and columns the nearer of both neighbours counts, modulo 1: no leap at outlines and seams, and steps of
+    more than half a texture are not told. 0 where uv is NaN, or there is no neighbour.
+    """
+    steps = []
+    for axis in (0, 1):
+        apart = np.diff(uv, axis=axis)
+        apart = np.where(np.isfinite(apart), apart - np.rint(apart), np.inf)
+        none = np.full_like(uv[:1] if axis == 0 else uv[:, :1], np.inf)
+        before, after = np.concatenate((none, apart), axis), np.concatenate((apart, none), axis)
+        nearest = np.where(abs(before).max(-1, keepdims=True) < abs(after).max(-1, keepdims=True), before, after)
+        steps.append(np.where(np.isfinite(nearest), nearest, 0.0))
+    down, right = steps
+    area = abs(down[..., 0] * right[..., 1] - down[..., 1] * right[..., 0])
+    return np.asarray(np.sqrt(area))
 
 
 def _beyond(light: Light, w: np.ndarray) -> np.ndarray | float:

@@ -59,6 +59,14 @@ def _turned(radius: np.ndarray, height: np.ndarray, phi: np.ndarray) -> np.ndarr
     return np.stack((x, y, z), axis=-1).reshape(-1, 3)
 
 
+def cylinder(radius: float = 2 / np.pi, height: float = 2.0, segments: int = 256) -> Mesh:
+    """An open cylinder about the origin, upright, seen from outside; u around, v up. Its own lengths make it twice as
+    long around as it is high. Raises `ParameterError` for lengths that are not positive, or fewer than 3 segments."""
+    if not (0 < radius < np.inf and 0 < height < np.inf):
+        raise ParameterError(f"cylinder: radius = {radius:g}, height = {height:g}; positive lengths are wanted.")
+    return revolve([(radius, -height / 2), (radius, height / 2)], segments)
+
+
 def vase(segments: int = 256) -> Mesh:
     """The vase of the demo and the examples: about two units high, its foot at z = -1, made of a smooth profile."""
     from scipy.interpolate import PchipInterpolator

@@ -9,6 +9,9 @@ import numpy as np
 
 from ..files.whole import writing
 
+# Of places that are marked in one panel and drawn in others.
+COLOURS = ("#d0381c", "#2f7fd0", "#2a9d5a", "#a05ad0", "#d08a1c", "#8a8a1c")
+
 
 def blank(width: float, height: float) -> Any:
     """A figure of so many inches, without window or toolkit."""

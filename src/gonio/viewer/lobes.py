@@ -19,10 +19,9 @@ from ..lights.points import Directional
 from ..reflection import textured
 from ..rendering.relight import Relightable, relight
 from ..rendering.tonemap import clipped, tone_map
-from .figures import blank, exposed, save
+from .figures import COLOURS, blank, exposed, save
 from .plots import INK
 
-_COLOURS = ("#d0381c", "#2f7fd0", "#2a9d5a", "#a05ad0", "#d08a1c", "#8a8a1c")
 _TRUSTED = math.exp(-1)
 _DIFFERENCES = (5.0, 30.0, 60.0)
 
@@ -55,7 +54,7 @@ def lobes_picture(path: str | Path, thing: Relightable, pixels: Sequence[tuple[i
     bounds = np.quantile(known, (0.02, 0.995)) if known.size else (-1.0, 1.0)
     theta_h = np.radians(np.linspace(0.2, 80, 160))
     curves = [_seen(material, len(pixels), theta_h, math.radians(theta_d), np.pi / 2) for theta_d in _DIFFERENCES]
-    for k, colour in enumerate(_COLOURS[: len(pixels)]):
+    for k, colour in enumerate(COLOURS[: len(pixels)]):
         axes = figure.add_subplot(grid[0, k + 1], projection="polar")
         drawn = axes.pcolormesh(phi, np.degrees(theta), shown[k], vmin=bounds[0], vmax=bounds[1], cmap="viridis")
         axes.set_rticks((30, 60), labels=("30", "60"))
@@ -84,7 +83,7 @@ def _view(axes: Any, thing: Relightable, pixels: Sequence[tuple[int, int]]) -> N
     wo = thing.view.wo[thing.view.mask].mean(axis=0)
     image = relight(thing, Directional(wo / np.linalg.norm(wo), [math.pi] * 3))
     axes.imshow(tone_map(exposed(image), clipped))
-    for (row, column), colour in zip(pixels, _COLOURS, strict=False):
+    for (row, column), colour in zip(pixels, COLOURS, strict=False):
         axes.plot(column, row, "o", color=colour, markersize=9, markeredgecolor="white")
     axes.set_axis_off()
 
