@@ -216,13 +216,17 @@ class Capture:
         """Those of the sites, (S,), counted along rows."""
         return np.flatnonzero(self.mask)
 
+    def towards_eye(self, positions: np.ndarray) -> np.ndarray:
+        """wo (S, 3), unit, from any `positions` (S, 3)."""
+        to = self.camera.towards(positions) if self.eye is None else self.eye - positions
+        towards: np.ndarray = normalise(to, "the way from positions to the eye")
+        return towards
+
     @cached_property
     def _to_eye(self) -> np.ndarray:
         """wo at the sites, (S, 3)."""
-        positions = self.positions[self.mask]
         if self.eye is not None:
-            towards: np.ndarray = normalise(self.eye - positions, "eye - positions")
-            return towards
+            return self.towards_eye(self.positions[self.mask])
         return -self.camera.rays()[1][self.mask]
 
 

@@ -57,6 +57,9 @@ class Observing(Protocol):
     def sites(self) -> Sites:
         """All sites. Raises `ArrayError` where the shape is unknown."""
 
+    def towards_eye(self, positions: np.ndarray) -> np.ndarray:
+        """wo (S, 3), unit, from `positions` (S, 3). Raises `ArrayError` where photographs are from many places."""
+
     def observe(self, k: int) -> Observation:
         """What photograph k tells of every site."""
 

@@ -103,6 +103,9 @@ class Turntable:
         lifted = positions + 1e-5 * float(np.max(high - low)) * normals
         return Sites(positions, lifted, np.asarray(frame(normals)))
 
+    def towards_eye(self, positions: np.ndarray) -> np.ndarray:
+        raise ArrayError("photographs are from many places: no one direction is to the eye. Take those from one place.")
+
     def observe(self, k: int) -> Observation:
         """What photograph k tells of every site."""
         return self._observe(k, self.sites)

@@ -1,7 +1,7 @@
 """Slices of reflectance on a grid of facets, from what lights showed: one operator for all texels (MS 8, 5.1).
 
     s(x) = p(x) + sum_k c_k |x - x_k|^3,    s(x_k) = v_k          x: half vectors on Lambert's map; p linear
-    v = log(rho + .01 max rho)                                    highlights span decades, and their logarithms bend less
+    v = log(rho + .01 max rho)                                    highlights span decades, and logarithms bend less
 
 s is linear in v: at the knots of a domain s = W v, with W (knots, lights) the same for all texels under the same
 lights, and a mean of operators where lights are near and a texel lies between their places (`facet_cells`). Where some

@@ -1,4 +1,4 @@
-"""Example-based microfacet synthesis: a flat sample, one view and many lights to a distribution of facets at every site.
+"""Example-based microfacet synthesis: from one view under many lights to a distribution of facets at every site.
 
     photographs -> slices (MS 8) less diffuse light (MS 9) -> partial D (MS 11) -> a few that stand for all (MS 5.3)
     -> eta (MS 19, 20) -> each of the few made whole from the others, turned (MS 14-17)
@@ -122,7 +122,7 @@ def synthesise_ndfs(
         SynthesisedNDFs(material, chosen, completed, residual),
         residual=total,
         converged=True,
-        reason=f"{len(chosen.texels)} distributions were made whole, {100 * completed.told.mean():.1f} % of facets told",
+        reason=f"{len(chosen.texels)} distributions made whole, {100 * completed.told.mean():.1f} % of facets told",
     )
 
 
@@ -146,7 +146,8 @@ class _Few:
     @property
     def cosines(self) -> np.ndarray:
         """h.o (n, rows, columns)."""
-        return np.clip(np.einsum("rcd,nd->nrc", self.grid.directions, self.wo), 0, 1).astype(np.float32)
+        cosines: np.ndarray = np.clip(np.einsum("rcd,nd->nrc", self.grid.directions, self.wo), 0, 1).astype(np.float32)
+        return cosines
 
     def indexed(self, eta: np.ndarray) -> _Few:
         """The same with another eta (n,): D is divided by what F rises."""
@@ -154,8 +155,8 @@ class _Few:
         return dataclasses.replace(self, tables=(self.tables * (before / now)).astype(np.float32), eta=eta)
 
     def refitted(self, whole: np.ndarray) -> np.ndarray:
-        """`whole` tables with a site's own data as MS 11 finds them with the areas of what is whole (MS 5), in the place
-        of those of D completed by its turn (`partial_ndf`)."""
+        """`whole` tables with a site's own data as MS 11 finds them with the areas of what is whole (MS 5), in the
+        place of those of D completed by its turn (`partial_ndf`)."""
         areas = FacetAreas(self.grid, _degree(self.grid))
         found, mass = whole.astype(np.float32), np.broadcast_to(self.grid.projected[:, None], self.grid.shape)
         for k, confidence in enumerate(self.confidence):
@@ -191,8 +192,8 @@ class _Partial:
         usual = np.mean([np.sum(solid * lit) for lit in self.lit])
         if np.sum(solid * self.common) < _COMMON * usual:
             raise ArrayError(
-                f"the facets that all sites show are {np.sum(solid * self.common) / usual:.0%} of what one shows: lights "
-                "are too near, or the sample too large or curved. Take a part of it (a mask), or lights farther away."
+                f"the facets that all sites show are {np.sum(solid * self.common) / usual:.0%} of what one shows: "
+                "lights are too near, or the sample too large or curved. Take a part of it, or lights farther away."
             )
         self.somewhere = np.logical_or.reduce(self.lit)
         W = np.mean([domain.confidence for domain in self.domains], axis=0)
@@ -300,7 +301,7 @@ def diffuse(measured: Slices, percentile: float = _PERCENTILE) -> np.ndarray:
     counts = bright & (measured.wi[..., 2] > _GRAZING)
     counts |= ~counts.any(axis=1, keepdims=True) & np.isfinite(radiance)
     least = np.nanpercentile(np.where(counts[..., None], measured.value, np.nan), percentile, axis=1)
-    return np.pi * np.maximum(least, 0)
+    return np.asarray(np.pi * np.maximum(least, 0))
 
 
 def _coloured(

@@ -8,9 +8,9 @@ until D is known wherever any of them is known at some turn. A distribution's ow
 MS 16 would average into them is of others. The little that no turn tells is filled: by the turn of pi, else by the mean
 of the ring, and beyond the outermost ring by the ring itself.
 
-The search is exhaustive, over all distributions and turns (`turned`), up to 1,024 of them. Beyond, each is compared with
-all once, and then, as it grows, with those alone that were nearest at some turn. Not here: which distributions stand
-for all (`representatives`).
+The search is exhaustive, over all distributions and turns (`turned`), up to 1,024 of them. Beyond, each is compared
+with all once, and then, as it grows, with those alone that were nearest at some turn. Not here: which distributions
+stand for all (`representatives`).
 """
 
 from __future__ import annotations
@@ -38,9 +38,9 @@ _ADDS = 0.995  # of a partner's domain, at most, is known already
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class CompletedNDFs:
-    """`tables` (n, rows, columns) of D, whole, of integral (n.h) D = 1; `known`, the same, where data tell of D, its own
-    or others' (the rest is filled); `own` and `told` (n,), the parts of the integral that are its own data, and that
-    are known; `partners` (mergers, n, 2): whom it was merged with and by how many columns that was turned, -1 where
+    """`tables` (n, rows, columns) of D, whole, of integral (n.h) D = 1; `known`, the same, where data tell of D, its
+    own or others' (the rest is filled); `own` and `told` (n,), the parts of the integral that are its own data, and
+    that are known; `partners` (mergers, n, 2): whom it was merged with and by how many columns that was turned, -1 where
     none was."""
 
     tables: np.ndarray
@@ -70,7 +70,8 @@ def complete_ndfs(
     Raises `ArrayError` where they do not fit, are negative, or not finite where known.
     """
     D, W = _checked(tables, confidence, grid)
-    n, own = len(D), W > 0
+    n = len(D)
+    own: np.ndarray = W > 0
     D = np.where(own, D, 0).astype(np.float32)
     partial = _Tables(D.copy(), W.astype(np.float32), grid)
     known = partial.W.copy()
@@ -119,11 +120,11 @@ def complete_ndfs(
     mass = grid.projected[:, None]
     data = known > 0
     _fill(D, data, grid)
+    D[np.sum(D * mass, axis=(1, 2)) == 0] = 1  # of nothing that shines all facets are alike
     sums = np.sum(D * mass, axis=(1, 2))
-    sums = np.where(sums > 0, sums, 1)
-    parts = (np.sum(np.where(where, D, 0) * mass, axis=(1, 2)) / sums for where in (own, data))
+    its_own, told = (np.sum(np.where(where, D, 0) * mass, axis=(1, 2)) / sums for where in (own, data))
     return CompletedNDFs(
-        (D / sums[:, None, None]).astype(np.float32), data, *parts, np.array(partners, int).reshape(-1, n, 2)
+        (D / sums[:, None, None]).astype(np.float32), data, its_own, told, np.array(partners, int).reshape(-1, n, 2)
     )
 
 
