@@ -1,12 +1,12 @@
 """Example-based microfacet synthesis: from one view under many lights to a distribution of facets at every site.
 
     photographs -> slices (MS 8) less diffuse light (MS 9) -> partial D (MS 11) -> a few that stand for all (MS 5.3)
-    -> eta (MS 19, 20) -> each of the few made whole from the others, turned (MS 14-17)
+    -> eta (MS 19, 20) -> each of the few made whole from the others, turned (MS 13-17)
     -> mixtures of them (MS 18), k_d and k_s by linear least squares
 
 In this order gonio departs from the paper, which finds eta last and k_s with D: F(h.o) rises two- to sixfold over a
 slice, and D that took it for facets agrees with nothing when turned. Each step is a function of its own
-(`facet_slices`, `partial_ndf`, `representatives`, `facet_index`, `synthesis`); here they are one after another, in
+(`facet_slices`, `partial_ndf`, `representatives`, `facet_index`, `completion`); here they are one after another, in
 blocks of sites: what is kept of each is half floats of its partial D. Not here: relief and light from texel to texel.
 """
 
@@ -27,6 +27,7 @@ from ..brdf.polar_grid import PolarGrid
 from ..directions import normalise
 from ..errors import MEMORY_LIMIT, ArrayError, MemoryLimitError, ParameterError
 from ..reflection import processors
+from .completion import CompletedNDFs, complete_ndfs
 from .facet_cells import Cells, Measured, Slices
 from .facet_domain import Domain
 from .facet_index import estimate_index, facing
@@ -34,7 +35,7 @@ from .facet_slices import FacetSlices, blended_slices
 from .model import Fit
 from .partial_ndf import Symmetric, fit_partial_ndfs
 from .representatives import Representatives, choose_representatives
-from .synthesis import CompletedNDFs, complete_ndfs
+from .synthesis import grow_ndfs
 
 _PERCENTILE = 5.0  # of lights that count, from below, k_d (MS 9: the least, which noise draws down)
 _FLOOR = 0.05  # of a site's mean radiance: darker lights are noise or shadow (MS 9)
@@ -76,8 +77,8 @@ def synthesise_ndfs(
 
     grid: of D, 32 x 96 where None, which serves cloth; `PolarGrid(96, 256)` brushed metal. representatives: 1 % of the
     sites where None, which are made whole; twice as many take four times as long and bring the error down by a fifth.
-    eta: the refractive index, found where None. paper: MS 15 as printed for the distance, and others averaged into a
-    distribution's own data (MS 16). tolerance: radians by which half vectors may differ between the nodes at which
+    eta: the refractive index, found where None. paper: grow distributions (MS 14-17; `synthesis`) where gonio takes
+    means of many (`completion`). tolerance: radians by which half vectors may differ between the nodes at which
     operators are made. threads: all processors where None. folder: where partial distributions are kept, 3 KB a site; a
     run that was stopped goes on from them. progress(step, done, total).
 
@@ -106,10 +107,12 @@ def synthesise_ndfs(
     if eta is None:
         index = estimate_index(few.tables, few.confidence, few.cosines, grid, _INDEX)
         few = few.indexed(index)
-    completed = complete_ndfs(
-        few.tables, few.confidence, grid, relative=not paper, keep_own=not paper, progress=hear("completion")
-    )
-    whole = completed.tables if paper else few.refitted(completed.tables)
+    if paper:
+        completed = grow_ndfs(few.tables, few.confidence, grid, progress=hear("synthesis"))
+        whole = completed.tables
+    else:
+        completed = complete_ndfs(few.tables, few.confidence, grid, workers, hear("completion"))
+        whole = completed.blended(few.refitted(completed.tables), few.confidence > 0)
     basis = FacetBasis.of(grid, whole, _trust(few.confidence, completed))
     mixture = FacetMixture(
         basis,

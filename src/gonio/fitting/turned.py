@@ -90,7 +90,6 @@ def best_turns(
     keep: int = 40,
     memory: int = 256_000_000,
     relative: bool = False,
-    partners: Array | None = None,
 ) -> Best:
     """The nearest of B turned distributions to each of A, of those whose domains lie between `overlap[0]` and
     `overlap[1]` within its own (MS 5.2 wants 50 to 85 %: likeness is told, and something is added).
@@ -98,8 +97,7 @@ def best_turns(
     relative: divide distances by the mean of (D1/s1)^2 + (D2/s2)^2, so that sharp facets are as far as dull ones.
     allowed: (A, B) False where a pair is excluded (itself, say). coarse: > 1 looks at means over so many rows by so
     many columns first, and then at the best `keep` of B as they are: among 1,600 cloths 4 finds the same for 99 % in
-    half of the time, among 400 nothing is gained. partners: (A, count) of B, -1 for none, where no others count, in the
-    place of `allowed` and `coarse`. memory: bytes to use beside the transforms.
+    half of the time, among 400 nothing is gained. memory: bytes to use beside the transforms.
 
     Raises `ArrayError` where grids, precisions or `allowed` do not fit, `ParameterError` for bounds that are no
     interval in [0, 1] and for other coarse and keep, `MemoryLimitError` where `memory` is too little for one pair.
@@ -118,15 +116,6 @@ def best_turns(
     if not min(shape):
         return best
     exact = _Pairs(first, second, memory, overlap, relative=relative)
-    if partners is not None:
-        given = np.sort(to_numpy(partners), axis=1)
-        if given.ndim != 2 or len(given) != shape[0] or given.max(initial=-1) >= shape[1]:
-            raise ArrayError(
-                f"partners have shape {given.shape}; ({shape[0]}, count) of 0 to {shape[1] - 1} is wanted."
-            )
-        given[:, 1:][given[:, 1:] == given[:, :-1]] = -1
-        exact.write_best(np.arange(shape[0]), np.maximum(given, 0), given >= 0, best)
-        return best
     looking = exact
     if coarse != 1:
         looking = _Pairs(first.coarser(coarse), second.coarser(coarse), memory, overlap, True, relative)
