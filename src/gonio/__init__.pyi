@@ -1,9 +1,14 @@
 from .brdf.albedo import albedo as albedo
 from .brdf.diffuse import Lambert as Lambert
 from .brdf.diffuse import OrenNayar as OrenNayar
+from .brdf.facet_mixture import FacetBasis as FacetBasis
+from .brdf.facet_mixture import FacetMixture as FacetMixture
 from .brdf.fresnel import Conductor as Conductor
 from .brdf.fresnel import Fresnel as Fresnel
 from .brdf.fresnel import Schlick as Schlick
+from .brdf.hemicube import Hemicube as Hemicube
+from .brdf.hemicube import from_hemicube as from_hemicube
+from .brdf.hemicube import to_hemicube as to_hemicube
 from .brdf.kajiya_kay import KajiyaKay as KajiyaKay
 from .brdf.lafortune import Lafortune as Lafortune
 from .brdf.merl_models import ABC as ABC
@@ -15,6 +20,7 @@ from .brdf.ndf_table import TabulatedNDF as TabulatedNDF
 from .brdf.phong import BlinnPhong as BlinnPhong
 from .brdf.phong import ModifiedPhong as ModifiedPhong
 from .brdf.phong import Phong as Phong
+from .brdf.polar_grid import PolarGrid as PolarGrid
 from .brdf.radial import Radial as Radial
 from .brdf.shadowing import Ashikhmin as Ashikhmin
 from .brdf.shadowing import Smith as Smith
@@ -87,6 +93,8 @@ from .files.shrm import read_shrm as read_shrm
 from .files.shrm import write_shrm as write_shrm
 from .files.transforms import write_transforms as write_transforms
 from .fitting.dichromatic import share_dichromatic as share_dichromatic
+from .fitting.microfacets import SynthesisedNDFs as SynthesisedNDFs
+from .fitting.microfacets import synthesise_ndfs as synthesise_ndfs
 from .fitting.model import Fit as Fit
 from .fitting.planning import Plan as Plan
 from .fitting.planning import plan_sharing as plan_sharing

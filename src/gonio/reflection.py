@@ -15,7 +15,6 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
-import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, TypeAlias, TypeVar
@@ -29,6 +28,7 @@ from .directions import dot, require_unit
 from .errors import ArrayError, ParameterError
 from .frames import require_rotation
 from .lights.model import Beams, Light
+from .threads import processors
 
 # Pairs of a site and a beam in one block: their directions and values fit a core's cache.
 PAIRS = 1 << 14
@@ -150,13 +150,6 @@ def textured(model: Model, uv: Array | None, width: Array | None = None) -> Mode
         return np.stack(found, axis=-1).reshape(-1, *texture.shape[2:])
 
     return varied(model, looked_up, lambda term: term.at(uv, width))
-
-
-def processors() -> int:
-    """How many processors this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def _block(

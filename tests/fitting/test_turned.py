@@ -12,7 +12,7 @@ from gonio.brdf.polar_grid import PolarGrid
 from gonio.errors import ArrayError, MemoryLimitError, ParameterError
 from gonio.fitting.facet_domain import Domain
 from gonio.fitting.turnable import Turnable
-from gonio.fitting.turned import best_turns, turned_distances
+from gonio.fitting.turned import best_turns, nearest_turns, turned_distances
 
 SMALL = PolarGrid(5, 8)
 GRID = PolarGrid(16, 48)
@@ -238,3 +238,35 @@ def test_too_many_turns_are_refused_before_any_memory_is_taken():
     many = Turnable.of(np.ones((10_000, 2, 3)), np.ones(thin.shape), thin)
     with pytest.raises(MemoryLimitError, match="ask for `best_turns`"):
         turned_distances(many, many)
+
+
+def test_the_nearest_of_each_range_of_turns_are_the_least(brushed):
+    some, _, _ = brushed
+    distances, overlaps = turned_distances(some, some)
+    ranges = ((0, 10), (10, 30), (30, 48))
+    found = nearest_turns(some, some, 5, ranges, (0.3, 0.9))
+    for (first, last), near in zip(ranges, found, strict=True):
+        within = np.where((overlaps > 0.3 - 1e-9) & (overlaps < 0.9 + 1e-9), distances, np.inf)[..., first:last]
+        least = np.sort(within.min(axis=2), axis=1)[:, :5]
+        np.testing.assert_allclose(near.distance, least, rtol=1e-9, atol=1e-12)
+        rows, known = np.arange(48)[:, None], near.second >= 0
+        at = within[rows, np.maximum(near.second, 0), np.clip(near.turn - first, 0, last - first - 1)]
+        np.testing.assert_allclose(at[known], near.distance[known], rtol=1e-9, atol=1e-12)
+        assert np.isinf(near.distance[~known]).all()
+    with pytest.raises(ParameterError, match="count = 0"):
+        nearest_turns(some, some, 0, ranges)
+    with pytest.raises(ParameterError, match="overlap"):
+        nearest_turns(some, some, 1, ranges, (0.9, 0.3))
+
+
+def test_relative_distances_are_over_the_squares_of_both(rng):
+    D, W = rng.random((4, *SMALL.shape)), confidences(rng, SMALL, 1)[0]
+    some, allowed = Turnable.of(D, W, SMALL), ~np.eye(4, dtype=bool)
+    best = best_turns(some, some, (0, 1), allowed, relative=True)
+    for a in range(4):
+        b, k = best.second[a], best.turn[a]
+        W2, D2 = np.roll(W, k, axis=1), np.roll(D[b], k, axis=1)
+        inside, weight = SMALL.solid_angles[:, None] * (W * W2 > 0), SMALL.solid_angles[:, None] * np.sqrt(W * W2)
+        x, y = D[a] / np.sum(D[a] * inside), D2 / np.sum(D2 * inside)
+        expected = np.sum(weight * (x - y) ** 2) / np.sum(weight * (x**2 + y**2))
+        assert best.distance[a] == pytest.approx(expected, rel=1e-9)

@@ -18,7 +18,7 @@ import numpy as np
 
 from .._kernels import photometric_stereo as kernels
 from ..errors import ArrayError
-from ..reflection import processors
+from ..threads import processors
 from .lighting import arriving, directions_from, directions_of, span_space
 from .model import Capture
 

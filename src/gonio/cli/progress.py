@@ -11,6 +11,13 @@ from contextlib import contextmanager
 @contextmanager
 def bar(label: str) -> Iterator[Callable[[int, int], None]]:
     """`with bar("render") as progress: work(progress=progress)`. Silent where stderr is not a terminal."""
+    with steps(label) as progress:
+        yield lambda done, total: progress(label, done, total)
+
+
+@contextmanager
+def steps(label: str) -> Iterator[Callable[[str, int, int], None]]:
+    """The same for work that tells (step, done, total): each step begins the bar anew, under its own name."""
     from rich import progress
     from rich.console import Console
 
@@ -24,8 +31,16 @@ def bar(label: str) -> Iterator[Callable[[int, int], None]]:
     )
     stderr = Console(file=sys.stderr)
     with progress.Progress(*columns, console=stderr, disable=not sys.stderr.isatty(), transient=True) as shown:
-        task = shown.add_task(label, total=None)
-        yield lambda done, total: shown.update(task, completed=done, total=total)
+        task, now = shown.add_task(label, total=None), label
+
+        def heard(step: str, done: int, total: int) -> None:
+            nonlocal now
+            if step != now:
+                now = step
+                shown.reset(task, description=step)
+            shown.update(task, completed=done, total=total)
+
+        yield heard
 
 
 @contextmanager

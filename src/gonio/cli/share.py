@@ -89,7 +89,7 @@ def share(
     scene = captures.read(capture, encoding, partial, lights)
     if residuals and not all(light.distant for light in scene.lights or ()):
         raise ParameterError(f"{capture} has near lights: --residuals are between distant ones, leave it out.")
-    left = _left_out(leave, len(scene.photographs))
+    left = left_out(leave, len(scene.photographs))
     kept = [k for k in range(len(scene.photographs)) if k not in left]
     behind = captures.read(crossed, encoding, partial, lights) if crossed else None
     if scene.normals is None:
@@ -155,10 +155,7 @@ def share(
         facts[f"m_xy, m_w, rho{name}"] = list(dataclasses.astuple(fit.value.scales))
         facts[f"ended{name}"] = fit.reason
 
-    def predicted(k: int) -> tuple[np.ndarray, np.ndarray, float]:
-        return _predicted(scene, behind, thing, k)
-
-    predictions = [predicted(k) for k in left]
+    predictions = [predicted(scene, behind, thing, k) for k in left]
     for k, (_, _, off) in zip(left, predictions, strict=True):
         facts[f"error of {scene.photographs.names[k]}"] = off
     if predictions:
@@ -167,9 +164,9 @@ def share(
         from gonio.viewer.sharing import sharing_picture
 
         names = [scene.photographs.names[k] for k in (left or kept[:3])]
-        shown = predictions or [predicted(k) for k in kept[:3]]
+        shown = predictions or [predicted(scene, behind, thing, k) for k in kept[:3]]
         sharing_picture(picture, names, shown, next(iter(fits.values())).history)
-    _say(facts, output, as_json)
+    say(facts, output, as_json)
     if stopped():
         typer.echo(f"go on with --resume {output}", err=True)
         raise typer.Exit(130)
@@ -177,7 +174,8 @@ def share(
         raise typer.Exit(1)
 
 
-def _say(facts: dict[str, Any], output: Path, as_json: bool) -> None:
+def say(facts: dict[str, Any], output: Path, as_json: bool) -> None:
+    """Facts by name on stdout, and the file they are about."""
     if as_json:
         typer.echo(json.dumps(facts))
         return
@@ -237,7 +235,7 @@ def _regions(path: Path | None, mask: np.ndarray) -> np.ndarray:
     return np.asarray(label).reshape(-1)
 
 
-def _left_out(text: str, count: int) -> list[int]:
+def left_out(text: str, count: int) -> list[int]:
     """The numbers of photographs that `--leave` names, each once."""
     from gonio.errors import ParameterError
 
@@ -307,7 +305,7 @@ def _photograph(scene: Capture, behind: Capture | None, k: int) -> tuple[np.ndar
     return photograph + crossed.radiance, clipped | crossed.clipped
 
 
-def _predicted(
+def predicted(
     scene: Capture, behind: Capture | None, thing: Relightable, k: int
 ) -> tuple[np.ndarray, np.ndarray, float]:
     """The photograph, what the model makes of its light, and their relative rms where it is not clipped."""

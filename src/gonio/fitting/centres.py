@@ -24,7 +24,7 @@ from .._kernels import radial as kernels
 from ..arrays import Array, require_finite, to_numpy
 from ..brdf.radial import Interpolant
 from ..errors import ArrayError
-from ..reflection import processors
+from ..threads import processors
 from .radial_basis import RadialSystem, anchors
 from .rules import Lookahead, Rule, Worst, require
 

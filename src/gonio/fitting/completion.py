@@ -25,7 +25,7 @@ import numpy as np
 from ..arrays import Array, to_numpy
 from ..brdf.polar_grid import PolarGrid
 from ..errors import ArrayError
-from ..reflection import processors
+from ..threads import processors
 from .turnable import Turnable
 from .turned import Nearest, nearest_turns
 
@@ -70,7 +70,7 @@ def complete_ndfs(
     Raises `ArrayError` where they do not fit, are negative, or not finite where known.
     """
     partial = Partial.of(tables, confidence, grid)
-    n, own = len(partial.D), partial.W > 0
+    n, own = len(partial.D), partial.known
 
     def hear(done: int) -> None:
         if progress is not None:
@@ -115,6 +115,11 @@ class Partial:
             raise ArrayError(f"confidence has shape {W.shape}; {grid.shape} or {D.shape} is wanted.")
         W = np.broadcast_to(W, D.shape).astype(np.float32)
         return cls(np.where(W > 0, D, 0).astype(np.float32), W, grid)
+
+    @property
+    def known(self) -> np.ndarray:
+        """Where data are (n, rows, columns)."""
+        return np.asarray(self.W > 0)
 
     def turned(self, which: np.ndarray, turn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """D and W of some (m,), each turned by so many columns."""

@@ -11,6 +11,8 @@ and a node is the one amidst them.
 from __future__ import annotations
 
 import dataclasses
+import itertools
+from collections.abc import Iterator
 from typing import Protocol
 
 import numpy as np
@@ -22,6 +24,7 @@ _FLAT = 3e-3  # radians by which frames of a flat sample differ at most
 _PROBES = 9  # along a side, where it is seen how fast half vectors wander
 _MOST = 96  # nodes along a side
 _FEWEST = 32  # sites of a cell of a curved sample
+_LARGEST = 1024
 
 
 class Slices(Protocol):
@@ -67,21 +70,68 @@ class Cell:
     nodes: np.ndarray
     shares: np.ndarray
 
+    def parts(self) -> Iterator[Cell]:
+        """The same in cells of few sites, whose tables take some ten megabytes."""
+        for low in range(0, len(self.sites), _LARGEST):
+            some = slice(low, low + _LARGEST)
+            yield Cell(self.sites[some], self.nodes, self.shares[some])
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Joined:
+    """Several samples, or one that was turned under the camera, as one larger sample (MS 4): their sites one after
+    another."""
+
+    parts: tuple[Measured, ...]
+
+    @property
+    def starts(self) -> np.ndarray:
+        """(parts + 1,): the first site of each, and the number of all."""
+        return np.cumsum([0, *(len(part) for part in self.parts)])
+
+    def __len__(self) -> int:
+        return int(self.starts[-1])
+
+    def at(self, some: np.ndarray) -> Slices:
+        """All lights at sites `some` (S,) of one of them."""
+        starts = self.starts
+        k = int(np.searchsorted(starts, some[0], side="right")) - 1
+        return self.parts[k].at(some - starts[k])
+
+    def blocks(self, size: int) -> list[np.ndarray]:
+        """All sites, `size` of one part at a time."""
+        ends = [(int(a), int(b)) for a, b in itertools.pairwise(self.starts)]
+        return [np.arange(low, min(low + size, b)) for a, b in ends for low in range(a, b, size)]
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Cells:
-    """`wi` (J, N, 3) and `wo` (J, 3), unit, local, of J nodes; the cells between them, neighbours one after another."""
+    """`wi`, of each of J nodes (N, 3), and `wo` (J, 3), unit, local; the cells between them, neighbours one after
+    another."""
 
-    wi: np.ndarray
+    wi: tuple[np.ndarray, ...]
     wo: np.ndarray
     cells: tuple[Cell, ...]
 
     @classmethod
-    def of(cls, measured: Measured, tolerance: float = 0.04) -> Cells:
+    def of(cls, measured: Joined, tolerance: float = 0.04) -> Cells:
         """Such that half vectors wander by `tolerance` radians at most from node to node, within 96 x 96 nodes.
 
         Raises `ArrayError` where there are no sites.
         """
+        several = [cls._one(part, tolerance) for part in measured.parts]
+        first = np.cumsum([0, *(len(one.wo) for one in several)])
+        cells = [
+            Cell(cell.sites + start, cell.nodes + node, cell.shares)
+            for one, start, node in zip(several, measured.starts[:-1], first[:-1], strict=True)
+            for cell in (part for whole in one.cells for part in whole.parts())
+        ]
+        return cls(
+            tuple(wi for one in several for wi in one.wi), np.concatenate([one.wo for one in several]), tuple(cells)
+        )
+
+    @classmethod
+    def _one(cls, measured: Measured, tolerance: float) -> Cells:
         places = measured.sites
         if not len(measured):
             raise ArrayError("there are no sites to divide into cells: the mask is empty.")
@@ -129,7 +179,7 @@ def _lattice(measured: Measured, tolerance: float) -> Cells:
             axis=1,
         )
         cells.append(Cell(sites, np.array([a * counts[1] + b for a, b in beside]), shares))
-    return Cells(wi, wo, tuple(cells))
+    return Cells(tuple(wi), wo, tuple(cells))
 
 
 def _clusters(measured: Measured, tolerance: float) -> Cells:
@@ -160,4 +210,4 @@ def _clusters(measured: Measured, tolerance: float) -> Cells:
         amidst.append(sites[int(np.argmin(np.sum(off * off, axis=1)))])
     wi, wo = measured.directions(places.positions[amidst], places.frames[amidst])
     cells = tuple(Cell(np.sort(s), np.array([k]), np.ones((len(s), 1))) for k, s in enumerate(done))
-    return Cells(wi, wo, cells)
+    return Cells(tuple(wi), wo, cells)

@@ -13,8 +13,10 @@ blocks of sites: what is kept of each is half floats of its partial D. Not here:
 from __future__ import annotations
 
 import dataclasses
+import math
 import os
-from collections.abc import Callable, Iterator
+import warnings
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -25,10 +27,10 @@ from ..brdf.facet_areas import FacetAreas
 from ..brdf.facet_mixture import FacetBasis, FacetMixture
 from ..brdf.polar_grid import PolarGrid
 from ..directions import normalise
-from ..errors import MEMORY_LIMIT, ArrayError, MemoryLimitError, ParameterError
-from ..reflection import processors
+from ..errors import MEMORY_LIMIT, AccuracyWarning, ArrayError, MemoryLimitError, ParameterError
+from ..threads import one_blas_thread, processors
 from .completion import CompletedNDFs, complete_ndfs
-from .facet_cells import Cells, Measured, Slices
+from .facet_cells import Cells, Joined, Measured, Slices
 from .facet_domain import Domain
 from .facet_index import estimate_index, facing
 from .facet_slices import FacetSlices, blended_slices
@@ -36,6 +38,8 @@ from .model import Fit
 from .partial_ndf import Symmetric, fit_partial_ndfs
 from .representatives import Representatives, choose_representatives
 from .synthesis import grow_ndfs
+from .turnable import Turnable
+from .turned import nearest_turns
 
 _PERCENTILE = 5.0  # of lights that count, from below, k_d (MS 9: the least, which noise draws down)
 _FLOOR = 0.05  # of a site's mean radiance: darker lights are noise or shadow (MS 9)
@@ -43,6 +47,8 @@ _GRAZING = 0.1  # cosine of light below which k_d is not looked for
 _INDEX = 1.5  # where the search for eta begins
 _BLOCK = 256
 _KEPT = 300  # operators at once
+_LOOKED_AT = 200  # sites, first of all
+_UNLIKE = 0.02  # relative squares: 14 % of D; .003 where facets recur, .05 to .5 where they do not
 _COMMON = 0.5  # of a site's domain that all share, at the least
 
 # (step, done, total)
@@ -60,8 +66,9 @@ class SynthesisedNDFs:
     residual: np.ndarray
 
 
+@one_blas_thread()
 def synthesise_ndfs(
-    measured: Measured,
+    measured: Measured | Sequence[Measured],
     *,
     grid: PolarGrid | None = None,
     representatives: int | None = None,
@@ -73,7 +80,8 @@ def synthesise_ndfs(
     folder: str | os.PathLike[str] | None = None,
     progress: Progress | None = None,
 ) -> Fit[SynthesisedNDFs]:
-    """The facets of all sites of `measured`: `capture.reflectance()` of a flat sample under many lights.
+    """The facets of all sites of `measured`: `capture.reflectance()` of a flat sample under many lights. Several join
+    as one (MS 4), as of a sample that was turned under the camera: their sites follow one another.
 
     grid: of D, 32 x 96 where None, which serves cloth; `PolarGrid(96, 256)` brushed metal. representatives: 1 % of the
     sites where None, which are made whole; twice as many take four times as long and bring the error down by a fifth.
@@ -83,8 +91,10 @@ def synthesise_ndfs(
     run that was stopped goes on from them. progress(step, done, total).
 
     Raises `ArrayError` where lights are too few or sites have no domain in common, `ParameterError` for settings that
-    are out of range, `MemoryLimitError` before more memory is taken than the limit.
+    are out of range, `MemoryLimitError` before more memory is taken than the limit. Warns (`AccuracyWarning`) where
+    facets are unlike when turned, since all threads run one way.
     """
+    sample = Joined(tuple(measured) if isinstance(measured, Sequence) else (measured,))
     grid = PolarGrid() if grid is None else grid
     if eta is not None and not 1 < eta <= 10:
         raise ParameterError(f"eta = {eta:g}; an index in (1, 10] is wanted, or None to find it.")
@@ -93,11 +103,12 @@ def synthesise_ndfs(
         return lambda done, total: progress(step, done, total) if progress is not None else None
 
     workers = processors() if threads is None else threads
-    partial = _Partial(measured, grid, tolerance, _INDEX if eta is None else eta, workers)
+    partial = _Partial(sample, grid, tolerance, _INDEX if eta is None else eta, workers)
+    _require_alike(partial, grid)
     values = partial.values(None if folder is None else Path(folder), hear("partial distributions"))
     chosen = choose_representatives(
         lambda low, high: values[low:high] * partial.weights,
-        len(measured),
+        len(sample),
         representatives,
         seed,
         hear("representatives"),
@@ -120,13 +131,34 @@ def synthesise_ndfs(
         chosen.weights / chosen.weights.sum(axis=1, keepdims=True),
         eta=np.clip(np.sum(chosen.weights * index[chosen.indices], axis=1), 1.01, 10),
     )
-    material, residual, total = _coloured(measured, mixture, workers, hear("colours"))
+    material, residual, total = _coloured(sample, mixture, workers, hear("colours"))
     return Fit(
         SynthesisedNDFs(material, chosen, completed, residual),
         residual=total,
         converged=True,
         reason=f"{len(chosen.texels)} distributions made whole, {100 * completed.told.mean():.1f} % of facets told",
     )
+
+
+def _require_alike(partial: _Partial, grid: PolarGrid) -> None:
+    """Looks at a few sites before hours are spent: whether their facets recur at other turns."""
+    some = np.unique(np.linspace(0, len(partial.measured) - 1, _LOOKED_AT).astype(int))
+    few = partial.looked_at(some)
+    common = np.where(partial.common, few.confidence.min(axis=0), 0)
+    turnable = Turnable.of(few.tables, common, grid, np.float32)
+    # An eighth to three eighths of a turn, either way: less shows nothing new, more has little in common.
+    eighth = grid.columns // 8
+    ranges = ((eighth, 3 * eighth + 1), (5 * eighth, 7 * eighth + 1))
+    near = nearest_turns(turnable, turnable, 1, ranges, (0.4, 1.0), relative=True)
+    off = np.median(np.min([x.distance[:, 0] for x in near], axis=0))
+    if _UNLIKE < off < np.inf:
+        warnings.warn(
+            f"facets of other sites, turned, are {100 * math.sqrt(off):.0f} % off at best: threads run one way, and "
+            "what the eye did not see there is guessed. Photograph the sample turned under the camera, too, and fit the "
+            "captures as one.",
+            AccuracyWarning,
+            stacklevel=4,
+        )
 
 
 def _trust(confidence: np.ndarray, completed: CompletedNDFs) -> np.ndarray:
@@ -185,7 +217,7 @@ def _degree(grid: PolarGrid) -> int:
 class _Partial:
     """Partial distributions cell by cell; operators are made as cells ask for them, and the latest kept."""
 
-    def __init__(self, measured: Measured, grid: PolarGrid, tolerance: float, eta: float, workers: int) -> None:
+    def __init__(self, measured: Joined, grid: PolarGrid, tolerance: float, eta: float, workers: int) -> None:
         self.measured, self.grid, self.eta, self.workers = measured, grid, eta, workers
         self.cells = Cells.of(measured, tolerance)
         self.domains = [Domain.under(grid, wo, wi) for wi, wo in zip(self.cells.wi, self.cells.wo, strict=True)]
@@ -227,8 +259,21 @@ class _Partial:
             hear(done, len(self.measured))
         return values
 
+    def looked_at(self, some: np.ndarray) -> _Few:
+        """Those of some sites, ascending, fitted for this alone."""
+        cells, values = self.cells.cells, np.empty((len(some), len(self.weights)), np.float32)
+        parts = [(k, cell.sites[np.isin(cell.sites, some)]) for k, cell in enumerate(cells)]
+        for k, sites in parts:
+            if len(sites):
+                self._make(sorted({int(n) for n in cells[k].nodes} - set(self._operators)))
+                values[np.searchsorted(some, sites)] = self._fit(k, sites)[:, self.somewhere]
+        return self._few(values, some)
+
     def of(self, values: np.ndarray, sites: np.ndarray) -> _Few:
         """Those of some sites, in their order."""
+        return self._few(values[sites], sites)
+
+    def _few(self, values: np.ndarray, sites: np.ndarray) -> _Few:
         place = np.empty(len(self.measured), int)
         for k, cell in enumerate(self.cells.cells):
             place[cell.sites] = k
@@ -238,7 +283,7 @@ class _Partial:
             domain = self._domain(k)
             confidence[mine], wo[mine] = domain.confidence, domain.wo
         tables = np.zeros(confidence.shape, np.float32)
-        tables[:, self.somewhere] = values[sites]
+        tables[:, self.somewhere] = values
         tables = np.where(confidence > 0, tables, 0)
         return _Few(self.grid, tables, tables, confidence, wo, np.full(len(sites), self.eta))
 
@@ -253,27 +298,32 @@ class _Partial:
         with ThreadPoolExecutor(self.workers) as pool:
             for low in range(0, len(cells), 8 * self.workers):
                 some = cells[low : low + 8 * self.workers]
-                wanted = sorted({int(n) for k in some for n in self.cells.cells[k].nodes} - set(self._operators))
-                made = dict(zip(wanted, pool.map(self._made, wanted), strict=True))
-                for number in list(self._operators)[: max(len(self._operators) + len(made) - _KEPT, 0)]:
-                    if not any(number in self.cells.cells[k].nodes for k in some):
-                        self._operators.pop(number)
-                self._operators |= made
+                nodes = {int(n) for k in some for n in self.cells.cells[k].nodes}
+                for number in [n for n in self._operators if n not in nodes][:-_KEPT]:
+                    self._operators.pop(number)
+                self._make(sorted(nodes - set(self._operators)), pool)
                 yield from pool.map(self._fit, some)
+
+    def _make(self, numbers: list[int], pool: ThreadPoolExecutor | None = None) -> None:
+        made = (map if pool is None else pool.map)(self._made, numbers)
+        self._operators |= dict(zip(numbers, made, strict=True))
 
     def _made(self, number: int) -> FacetSlices:
         slices = FacetSlices(self.domains[number], self.cells.wi[number])
         _ = slices.weights
         return slices
 
-    def _fit(self, k: int) -> np.ndarray:
+    def _fit(self, k: int, sites: np.ndarray | None = None) -> np.ndarray:
+        """Tables of all sites of cell k, or some of them."""
         cell, domain = self.cells.cells[k], self._domain(k)
-        measured = self.measured.at(cell.sites)
+        sites = cell.sites if sites is None else sites
+        shares = cell.shares[np.isin(cell.sites, sites)]
+        measured = self.measured.at(sites)
         rho = measured.value.mean(axis=-1)
         known = np.isfinite(rho)
         shine = np.maximum(np.where(known, rho, 0) - diffuse(measured).mean(axis=1, keepdims=True) / np.pi, 0)
         nodes = [self._operators[int(number)] for number in cell.nodes]
-        slices = blended_slices(nodes, cell.shares, shine, known)
+        slices = blended_slices(nodes, shares, shine, known)
         return fit_partial_ndfs(slices, domain, self.eta, degree=_degree(self.grid)).tables
 
 
@@ -308,13 +358,13 @@ def diffuse(measured: Slices, percentile: float = _PERCENTILE) -> np.ndarray:
 
 
 def _coloured(
-    measured: Measured, mixture: FacetMixture, workers: int, hear: Callable[[int, int], None]
+    measured: Joined, mixture: FacetMixture, workers: int, hear: Callable[[int, int], None]
 ) -> tuple[FacetMixture, np.ndarray, float]:
     """`mixture` with k_d and k_s (S, 3) >= 0 by least squares of radiance, what is left of each site's, and of all."""
     count = len(measured)
     k_d, k_s = np.zeros((2, count, 3))
     off, whole = np.zeros((2, count))
-    blocks = [np.arange(low, min(low + _BLOCK, count)) for low in range(0, count, _BLOCK)]
+    blocks = measured.blocks(_BLOCK)
 
     def solved(some: np.ndarray) -> tuple[np.ndarray, ...]:
         return _least_squares(measured.at(some), _sites(mixture, some))

@@ -36,9 +36,9 @@ def grow_ndfs(
     """As `complete_ndfs`. overlap: the part of a partner's domain that lies within what is known already."""
     partial = Partial.of(tables, confidence, grid)
     D, known = partial.D.copy(), partial.W.copy()
-    own: np.ndarray = np.greater(partial.W, 0)
+    own = partial.known
     # Columns do not matter at all turns: a ring is told of if any of them is, of any distribution.
-    could = np.broadcast_to(own.any(axis=(0, 2))[:, None], grid.shape)
+    could = np.broadcast_to(np.asarray(own.any(axis=(0, 2)))[:, None], grid.shape)
     w = grid.solid_angles[:, None]
     each = Turnable.of(partial.D, partial.W, grid, np.float32)
     left = np.arange(len(D))

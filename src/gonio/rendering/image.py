@@ -24,8 +24,9 @@ from ..errors import MEMORY_LIMIT, AccuracyWarning, ArrayError, MemoryLimitError
 from ..lights.environment import Environment
 from ..lights.model import Beams, Light
 from ..lights.points import Lights
-from ..reflection import processors, radiance, textured
+from ..reflection import radiance, textured
 from ..shapes.view import Shape
+from ..threads import processors
 
 # Neighbouring pixels have neighbouring normals, so that a small tile leaves out nearly half the sky at once; with few
 # beams larger tiles waste less on their making.

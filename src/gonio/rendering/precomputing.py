@@ -22,8 +22,9 @@ from concurrent.futures import Future, ThreadPoolExecutor
 import numpy as np
 
 from ..errors import MEMORY_LIMIT, AccuracyWarning, ArrayError, MemoryLimitError, ParameterError
-from ..reflection import PAIRS, processors, textured
+from ..reflection import PAIRS, textured
 from ..shapes.mesh import Mesh
+from ..threads import processors
 from .precomputed import Cells, Precomputed, blocks
 from .relight import Relightable
 

@@ -16,9 +16,9 @@ from ..cameras import Camera, Pinhole
 from ..directions import normalise
 from ..errors import MEMORY_LIMIT, MemoryLimitError, ParameterError
 from ..lights.environment import Environment
-from ..reflection import processors
 from ..shapes.analytic import Sphere
 from ..shapes.view import Shape
+from ..threads import processors
 from .shrm import SHRM
 
 _RAYS = 1 << 17  # at once: their fields are some twenty megabytes

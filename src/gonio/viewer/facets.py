@@ -17,7 +17,7 @@ from ..arrays import to_numpy
 from ..brdf.facet_mixture import FacetMixture
 from ..rendering.relight import Relightable
 from ..rendering.tonemap import clipped, tone_map
-from .figures import COLOURS, blank, exposed, save
+from .figures import COLOURS, blank, colour_bar, exposed, save
 from .plots import INK
 
 _MOST = 400  # pixels of a map along its longer side
@@ -69,7 +69,7 @@ def facets_picture(path: str | Path, thing: Relightable, pixels: Sequence[tuple[
             axes.set_xlim(-1.04, 1.04)
             axes.set_ylim(-1.04, 1.04)
             axes.set_axis_off()
-        _bar(figure, drawn, panels[-1], name)
+        colour_bar(figure, drawn, panels[-1], name)
     return save(figure, path)
 
 
@@ -94,7 +94,7 @@ def _maps(
         axes.set_title(name, color=INK, fontsize=9)
         axes.set_axis_off()
         if name == "eta":
-            _bar(figure, shown, axes, "")
+            colour_bar(figure, shown, axes, "")
         for (row, column), colour in zip(pixels, COLOURS, strict=False):
             axes.plot(column, row, "o", color=colour, markersize=6, markeredgecolor="white")
 
@@ -119,10 +119,3 @@ def _category(number: np.ndarray) -> np.ndarray:
     shade = np.array([0.95, 0.7, 0.45])[number % 3][:, None]
     colour = shade * (0.25 + 0.75 * np.clip(abs(6 * ((hue - [0, 1 / 3, 2 / 3]) % 1.0) - 3) - 1, 0, 1))
     return np.concatenate((colour, np.ones_like(hue)), axis=-1)
-
-
-def _bar(figure: Any, drawn: Any, axes: Any, name: str) -> None:
-    bar = figure.colorbar(drawn, ax=axes, fraction=0.046, pad=0.02)
-    bar.set_label(name, color=INK, fontsize=8)
-    bar.ax.tick_params(colors=INK, labelsize=7)
-    bar.outline.set_edgecolor(INK)

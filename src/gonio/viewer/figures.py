@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..files.whole import writing
+from .plots import INK
 
 # Of places that are marked in one panel and drawn in others.
 COLOURS = ("#d0381c", "#2f7fd0", "#2a9d5a", "#a05ad0", "#d08a1c", "#8a8a1c")
@@ -34,3 +35,11 @@ def exposed(image: np.ndarray) -> np.ndarray:
     """The image (rows, columns, 3) so bright that all but 2 % of it lies below .8."""
     bright = float(np.quantile(image.max(axis=2), 0.98))
     return image * (0.8 / bright) if bright > 0 else image
+
+
+def colour_bar(figure: Any, drawn: Any, axes: Any, name: str) -> None:
+    """Beside `axes`, of what is `drawn` in them."""
+    bar = figure.colorbar(drawn, ax=axes, fraction=0.046, pad=0.02)
+    bar.set_label(name, color=INK, fontsize=8)
+    bar.ax.tick_params(colors=INK, labelsize=7)
+    bar.outline.set_edgecolor(INK)

@@ -1,4 +1,4 @@
-"""What reflectance sharing predicts, to look at."""
+"""What was fitted to photographs predicts, to look at."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ..rendering.tonemap import clipped, tone_map
-from .figures import blank, save
+from .figures import blank, colour_bar, save
 from .plots import INK
 
 
@@ -16,10 +16,12 @@ def sharing_picture(
     path: str | Path,
     names: Sequence[str],
     shown: Sequence[tuple[np.ndarray, np.ndarray, float]],
-    history: Sequence[tuple[int, float]],
+    history: Sequence[tuple[int, float]] = (),
+    residual: np.ndarray | None = None,
 ) -> Path:
     """Write a PNG: for each of `shown` (photograph, prediction, relative rms) both, equally exposed, with four times
-    their difference about gray; below them the residual as centres were added, `history`."""
+    their difference about gray; below them the residual as centres were added, `history`, or a map of the relative
+    rms `residual` (rows, columns), NaN where there is none."""
     rows, columns = shown[0][0].shape[:2]
     side = 3.2
     figure = blank(3 * side, len(shown) * (side * rows / columns + 0.4) + 2.6)
@@ -37,9 +39,16 @@ def sharing_picture(
             axes.imshow(panel)
             axes.set_title(title, color=INK, fontsize=8)
             axes.set_axis_off()
+    if residual is not None:
+        axes = figure.add_subplot(grid[len(shown), 0])
+        drawn = axes.imshow(100 * residual, cmap="magma", vmin=0)
+        axes.set_title("residual of each pixel, %", color=INK, fontsize=8)
+        axes.set_axis_off()
+        colour_bar(figure, drawn, axes, "")
+        return save(figure, path)
     axes = figure.add_subplot(grid[len(shown), :])
-    count, residual = np.array(history).T if len(history) else (np.array([1.0]), np.array([1.0]))
-    axes.loglog(count, residual, color="#d08a1c", marker=".", linewidth=1.2)
+    count, left = np.array(history).T if len(history) else (np.array([1.0]), np.array([1.0]))
+    axes.loglog(count, left, color="#d08a1c", marker=".", linewidth=1.2)
     axes.set_xlabel("centres", color=INK, fontsize=8)
     axes.set_ylabel("rms residual", color=INK, fontsize=8)
     axes.tick_params(which="both", colors=INK, labelsize=7)
