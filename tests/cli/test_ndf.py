@@ -259,3 +259,12 @@ def test_mixtures_of_sites_become_textures_of_whole_numbers(folder):
     )
     np.testing.assert_array_equal(material.indices[capture.mask], indices)
     assert material.k_d == 0.1
+
+
+def test_a_sample_turned_under_the_camera_is_fitted_with_it(capsys, tmp_path, folder):
+    output = tmp_path / "both.gonio"
+    code, out, err = run(capsys, "ndf", folder, "-o", output, *QUICK, "--turned", folder, "--json")
+    assert (code, err) == (0, "")
+    material = gn.read_relightable(output).material
+    assert material.k_d.shape[:2] == (24, 24)  # of the first alone
+    assert json.loads(out)["sites"] == np.count_nonzero(gn.read_capture(folder).mask)

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import hashlib
 import json
 import shutil
-from collections.abc import Callable
+import warnings
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
 
+from ..errors import GonioWarning
 from . import captures
 from .progress import steps
 from .share import left_out, predicted, say
@@ -74,10 +77,10 @@ def ndf(
     if eta is not None and not 1 < eta <= 10:
         raise ParameterError(f"--eta {eta:g}: an index in (1, 10] is wanted; leave it out to have it found.")
     knots = _grid(grid)
-    warnings: list[str] = []
+    warned: list[str] = []
 
     def warn(text: str) -> None:
-        warnings.append(text)
+        warned.append(text)
         typer.echo(f"{capture}: {text}", err=True)
 
     scene = captures.read(capture, encoding, partial, lights)
@@ -111,7 +114,7 @@ def ndf(
         }
         _begin(folder, told)
     try:
-        with steps("photographs") as progress:
+        with steps("photographs") as progress, _said(warn):
             some, clipped = _held(scene.select(kept), capture, lambda *of: progress("photographs", *of))
             if clipped > _CLIPPED:
                 warn(f"{clipped:.1%} of what its photographs show is clipped: expose shorter, or merge brackets")
@@ -168,8 +171,17 @@ def ndf(
         else:
             facets_picture(picture, thing, spread_pixels(scene.mask))
     if as_json:
-        facts["warnings"] = warnings
+        facts["warnings"] = warned
     say(facts, output, as_json)
+
+
+@contextlib.contextmanager
+def _said(warn: Callable[[str], None]) -> Iterator[None]:
+    """Warnings of the fit go to `warn` at once: hours may follow."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", GonioWarning)
+        warnings.showwarning = lambda message, *_, **__: warn(str(message))
+        yield
 
 
 def _grid(text: str) -> PolarGrid:

@@ -154,8 +154,8 @@ def _require_alike(partial: _Partial, grid: PolarGrid) -> None:
     if _UNLIKE < off < np.inf:
         warnings.warn(
             f"facets of other sites, turned, are {100 * math.sqrt(off):.0f} % off at best: threads run one way, and "
-            "what the eye did not see there is guessed. Photograph the sample turned under the camera, too, and fit the "
-            "captures as one.",
+            "what the eye did not see there is guessed. Photograph the sample turned under the camera, too, and fit "
+            "both as one.",
             AccuracyWarning,
             stacklevel=4,
         )
