@@ -366,3 +366,10 @@ def test_confidence_is_that_of_tensors_and_textures(rng):
 def test_trust_that_is_none_is_refused(change, message):
     with pytest.raises(GonioError, match=message):
         FacetBasis(GRID, BASIS.tables, change(trusted()))
+
+
+def test_a_texel_brighter_than_white_has_lobes_all_the_same(rng):
+    """Photographs in arbitrary units have any albedo."""
+    model = dataclasses.replace(mixture(rng), k_d=np.array([1.5, 1.2, 0.9]))
+    wi, wo = directions(50, 1), directions(50, 2)
+    np.testing.assert_allclose(sum(lobe.f(wi, wo) for lobe in model.lobes()), model.f(wi, wo), rtol=1e-5)

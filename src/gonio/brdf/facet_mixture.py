@@ -243,7 +243,7 @@ class FacetMixture(BRDF):
         return through(kernel, wi, wo, (numbers, to_numpy(self.k_d) / math.pi, specular, eta))
 
     def lobes(self) -> tuple[BRDF, ...]:
-        return Lambert(self.k_d), dataclasses.replace(self, k_d=0.0)
+        return Lambert(1.0) * self.k_d, dataclasses.replace(self, k_d=0.0)
 
     def _strength(self, xp: Any, wo: Array) -> Array:
         matte, glossy = self._parts(xp, wo)

@@ -49,7 +49,7 @@ _BLOCK = 256
 _KEPT = 300  # operators at once
 _LOOKED_AT = 200  # sites, first of all
 _UNLIKE = 0.02  # relative squares: 14 % of D; .003 where facets recur, .05 to .5 where they do not
-_COMMON = 0.5  # of a site's domain that all share, at the least
+_COMMON = 0.25  # of a site's domain that all share, at the least
 
 # (step, done, total)
 Progress = Callable[[str, int, int], None]

@@ -19,6 +19,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 from scipy.linalg import eigh
+from scipy.sparse import csr_array
 
 from ..errors import ParameterError
 
@@ -125,7 +126,8 @@ def _clustered(a: np.ndarray, most: int, rng: np.random.Generator, hear: Callabl
             far[some] = squares[np.arange(len(found)), found]
             moved += int(np.count_nonzero(found != label[some]))
             label[some] = found
-            np.add.at(sums, found, a[some])
+            ones = np.ones(len(found), np.float32), (found, np.arange(len(found)))
+            sums += csr_array(ones, shape=(most, len(found))) @ a[some]
             sizes += np.bincount(found, minlength=most)
             hear(number + 1, some.stop)
         mean = (sums / np.maximum(sizes, 1)[:, None]).astype(np.float32)
