@@ -5,7 +5,8 @@
 
 over the overlaps of a with its nearest partners, turned: there one facet is seen at two angles to the eye, and F tells
 them apart. MS compares F with what is left of a texel's own data when D is divided out; but that D was made of those
-data, and answers to any eta. Index 1.5 cloth of 1.38 to 1.58 comes back to .03 (`reproductions/facets.py`).
+data, and answers to any eta. That of cloth of 1.38 to 1.58 comes back to .03, rms: `microfacet_synthesis.py` of the
+reproductions.
 """
 
 from __future__ import annotations
@@ -35,7 +36,8 @@ def facing(eta: Array, cosine: np.ndarray) -> np.ndarray:
 def estimate_index(
     tables: np.ndarray, confidence: np.ndarray, cosines: np.ndarray, grid: PolarGrid, start: float = 1.5
 ) -> np.ndarray:
-    """eta (n,), in [1.15, 2.5], of partial distributions `tables` (n, rows, columns) that were fitted with `start`.
+    """eta (n,), in [1.15, 2.5], of partial distributions `tables` (n, rows, columns) that were fitted with `start`;
+    which it is where nothing tells: seen from above, say, F hardly changes.
 
     confidence: W >= 0, 0 outside their domains, and cosines: h.o, both (n, rows, columns). Where a distribution has no
     partner, that of all others.
@@ -53,7 +55,7 @@ def estimate_index(
                 off[:, some] += _apart(
                     tables, confidence, cosines, grid, start, best, some[best.second[some] >= 0], some
                 )
-        eta = _least(np.where(told > 0, off, off.sum(axis=1, keepdims=True)))
+        eta = _least(np.where(told > 0, off, off.sum(axis=1, keepdims=True)), start)
     return eta
 
 
@@ -97,12 +99,14 @@ def _apart(
     return off
 
 
-def _least(off: np.ndarray) -> np.ndarray:
-    """Where a parabola through the least of each column and its neighbours is least."""
-    k = np.clip(off.argmin(axis=0), 1, len(_CANDIDATES) - 2)
+def _least(off: np.ndarray, start: float) -> np.ndarray:
+    """Where a parabola through the least of each column and its neighbours is least; `start` where it is at an end."""
+    k = off.argmin(axis=0)
+    inside = (k > 0) & (k < len(_CANDIDATES) - 1)
+    k = np.clip(k, 1, len(_CANDIDATES) - 2)
     each = np.arange(off.shape[1])
     before, least, after = off[k - 1, each], off[k, each], off[k + 1, each]
     bend = before - 2 * least + after
     step = 0.5 * (before - after) / np.where(bend > 0, bend, np.inf)
     found = _CANDIDATES[k] + np.clip(step, -1, 1) * (_CANDIDATES[1] - _CANDIDATES[0])
-    return np.asarray(np.clip(found, LEAST, MOST))
+    return np.asarray(np.where(inside, found, start))

@@ -29,7 +29,7 @@ from ..brdf.polar_grid import PolarGrid
 from ..directions import normalise
 from ..errors import MEMORY_LIMIT, AccuracyWarning, ArrayError, MemoryLimitError, ParameterError
 from ..threads import one_blas_thread, processors
-from .completion import CompletedNDFs, complete_ndfs
+from .completion import CompletedNDFs, complete_ndfs, completed
 from .facet_cells import Cells, Joined, Measured, Slices
 from .facet_domain import Domain
 from .facet_index import estimate_index, facing
@@ -47,9 +47,9 @@ _GRAZING = 0.1  # cosine of light below which k_d is not looked for
 _INDEX = 1.5  # where the search for eta begins
 _BLOCK = 256
 _KEPT = 300  # operators at once
+_COMMON = 0.7  # of what one site shows, shown by all: it is enough to tell sites apart
 _LOOKED_AT = 200  # sites, first of all
 _UNLIKE = 0.02  # relative squares: 14 % of D; .003 where facets recur, .05 to .5 where they do not
-_COMMON = 0.25  # of a site's domain that all share, at the least
 
 # (step, done, total)
 Progress = Callable[[str, int, int], None]
@@ -90,9 +90,9 @@ def synthesise_ndfs(
     operators are made. threads: all processors where None. folder: where partial distributions are kept, 3 KB a site; a
     run that was stopped goes on from them. progress(step, done, total).
 
-    Raises `ArrayError` where lights are too few or sites have no domain in common, `ParameterError` for settings that
-    are out of range, `MemoryLimitError` before more memory is taken than the limit. Warns (`AccuracyWarning`) where
-    facets are unlike when turned, since all threads run one way.
+    Raises `ArrayError` where lights are too few, `ParameterError` for settings that are out of range,
+    `MemoryLimitError` before more memory is taken than the limit. Warns (`AccuracyWarning`) where facets are unlike
+    when turned, since all threads run one way.
     """
     sample = Joined(tuple(measured) if isinstance(measured, Sequence) else (measured,))
     grid = PolarGrid() if grid is None else grid
@@ -144,8 +144,7 @@ def _require_alike(partial: _Partial, grid: PolarGrid) -> None:
     """Looks at a few sites before hours are spent: whether their facets recur at other turns."""
     some = np.unique(np.linspace(0, len(partial.measured) - 1, _LOOKED_AT).astype(int))
     few = partial.looked_at(some)
-    common = np.where(partial.common, few.confidence.min(axis=0), 0)
-    turnable = Turnable.of(few.tables, common, grid, np.float32)
+    turnable = Turnable.of(few.tables, few.confidence, grid, np.float32)
     # An eighth to three eighths of a turn, either way: less shows nothing new, more has little in common.
     eighth = grid.columns // 8
     ranges = ((eighth, 3 * eighth + 1), (5 * eighth, 7 * eighth + 1))
@@ -222,22 +221,21 @@ class _Partial:
         self.cells = Cells.of(measured, tolerance)
         self.domains = [Domain.under(grid, wo, wi) for wi, wo in zip(self.cells.wi, self.cells.wo, strict=True)]
         self.lit = [np.logical_and.reduce([self.domains[k].confidence > 0 for k in c.nodes]) for c in self.cells.cells]
-        self.common = np.logical_and.reduce(self.lit)
-        solid = grid.solid_angles[:, None]
-        usual = np.mean([np.sum(solid * lit) for lit in self.lit])
-        if np.sum(solid * self.common) < _COMMON * usual:
-            raise ArrayError(
-                f"the facets that all sites show are {np.sum(solid * self.common) / usual:.0%} of what one shows: "
-                "lights are too near, or the sample too large or curved. Take a part of it, or lights farther away."
-            )
         self.somewhere = np.logical_or.reduce(self.lit)
+        shares = np.array([len(cell.sites) for cell in self.cells.cells]) / len(measured)
+        seen = sum(share * lit for share, lit in zip(shares, self.lit, strict=True))
+        solid, common = grid.solid_angles[:, None], np.logical_and.reduce(self.lit)
+        if np.sum(solid * common) > _COMMON * np.sum(solid * seen):
+            seen = common
+        # MS 15 weighs squares by W and solid angle. What not all sites show does not count, or where that is much, as
+        # on relief, as much as the part of them that does.
         W = np.mean([domain.confidence for domain in self.domains], axis=0)
-        # MS 15 weighs squares by W and solid angle; what is not common to all does not count.
-        self.weights = np.where(self.common, np.sqrt(W * solid), 0)[self.somewhere].astype(np.float32)
+        self.weights = np.sqrt(W * seen * solid)[self.somewhere].astype(np.float32)
         self._operators: dict[int, FacetSlices] = {}
 
     def values(self, folder: Path | None, hear: Callable[[int, int], None]) -> np.ndarray:
-        """D (S, K), half floats, at the knots that any site shows; in a file of `folder` where one is given."""
+        """D (S, K), half floats, at the knots that any site shows; in a file of `folder` where one is given. Where a
+        site shows nothing, what is likely: that sites are alike is told by all that any shows."""
         shape = len(self.measured), int(np.count_nonzero(self.somewhere))
         need = 2 * shape[0] * shape[1]
         if folder is None:
@@ -253,7 +251,7 @@ class _Partial:
         done = len(self.measured) - sum(len(self.cells.cells[k].sites) for k in left)
         for k, tables in zip(left, self._fitted(left), strict=True):
             sites = self.cells.cells[k].sites
-            values[sites] = tables[:, self.somewhere]
+            values[sites] = completed(tables, self.lit[k])[:, self.somewhere]
             begun[k] = True
             done += len(sites)
             hear(done, len(self.measured))
