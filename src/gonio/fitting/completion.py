@@ -6,8 +6,8 @@
 
 over the four nearest b at each twelfth of a turn, each compared with the data themselves; d_0 is the third least of the
 d_b. MS grows a distribution by one partner after the other around the normal (`synthesis`): each merger compares with
-what earlier ones brought, and what is found on the far side is one distribution's, and as far off as it is. For cloth
-D is 7.0 % off where it is not known, and 10.7 % when it is grown; and all is found by one comparison of each with each.
+what earlier ones brought, and what is found on the far side is one distribution's, and as far off as it is. Here all is
+found by one comparison of each with each.
 
 Where a distribution has data of its own, others tell of it too, and a third of them (`blended`) evens out what noise
 and the space between lights leave. Not here: which distributions stand for all (`representatives`).

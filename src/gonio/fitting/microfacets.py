@@ -84,7 +84,7 @@ def synthesise_ndfs(
     as one (MS 4), as of a sample that was turned under the camera: their sites follow one another.
 
     grid: of D, 32 x 96 where None, which serves cloth; `PolarGrid(96, 256)` brushed metal. representatives: 1 % of the
-    sites where None, which are made whole; twice as many take four times as long and bring the error down by a fifth.
+    sites where None, which are made whole; some two and a half times as many bring the error down by a fourth.
     eta: the refractive index, found where None. paper: grow distributions (MS 14-17; `synthesis`) where gonio takes
     means of many (`completion`). tolerance: radians by which half vectors may differ between the nodes at which
     operators are made. threads: all processors where None. folder: where partial distributions are kept, 3 KB a site; a
