@@ -134,7 +134,7 @@ def test_no_more_is_reflected_than_arrives(rng):
     # F(c) / F(1) is 25 at grazing angles: what the facets reflect at normal incidence is F(1).
     model = dataclasses.replace(mixture(rng, 6), k_d=np.full(3, 0.5), k_s=np.full(3, 0.04), eta=1.5)
     for theta in (0.0, 0.8, 1.3):
-        wi = directions(20000, 3)  # uniform in z over [.02, 1]
+        wi = directions(3000, 3)  # uniform in z over [.02, 1]
         wo = gn.from_spherical(theta, 0.3)
         albedo = (model.f(wi[:, None], wo) * wi[:, None, 2:]).mean(axis=0) * 2 * np.pi * 0.98
         assert np.all(albedo < 1)
@@ -176,11 +176,11 @@ def test_samples_fall_by_their_density(rng):
 
 def test_samples_and_density_give_the_albedo(rng):
     model, wo = mixture(rng, 4), gn.from_spherical(0.5, 1.0)
-    wi = directions(40000, 3)
+    wi = directions(6000, 3)
     albedo = (model.f(wi[:, None], wo) * wi[:, None, 2:]).mean(axis=0) * 2 * np.pi * 0.98
-    drawn = model.sample(wo, rng.random((20000, 4, 3)))
+    drawn = model.sample(wo, rng.random((4000, 4, 3)))
     estimate = (model.f(drawn, wo) * drawn[..., 2:] / model.pdf(drawn, wo)[..., None]).mean(axis=0)
-    assert np.allclose(estimate, albedo, rtol=0.03)
+    assert np.allclose(estimate, albedo, rtol=0.06)  # three standard errors of both
     lobes = sum(lobe.f(wi[:, None], wo) for lobe in model.lobes())
     assert np.allclose(lobes, model.f(wi[:, None], wo))
 

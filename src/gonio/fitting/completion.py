@@ -139,7 +139,7 @@ class Partial:
 def finished(D: np.ndarray, own: np.ndarray, others: np.ndarray, grid: PolarGrid) -> CompletedNDFs:
     """What is told, NaN where nothing tells, filled and normalised."""
     known = np.isfinite(D)
-    D = completed(np.where(known, D, 0), known)
+    D = filled(np.where(known, D, 0), known)
     mass = grid.projected[:, None]
     D[np.sum(D * mass, axis=(1, 2)) == 0] = 1  # of nothing that shines all facets are alike
     sums = np.sum(D * mass, axis=(1, 2))
@@ -148,17 +148,17 @@ def finished(D: np.ndarray, own: np.ndarray, others: np.ndarray, grid: PolarGrid
     return CompletedNDFs((D * unit).astype(np.float32), known, others * unit, its_own, told)
 
 
-def completed(D: np.ndarray, known: np.ndarray) -> np.ndarray:
+def filled(D: np.ndarray, known: np.ndarray) -> np.ndarray:
     """`D` (n, rows, columns) filled where it is not `known` (rows, columns), or (n, rows, columns): by the turn of pi,
     else by the mean of the ring, and beyond the outermost ring by the ring itself."""
     columns = D.shape[2]
     known = np.broadcast_to(known, D.shape)
     turned, seen = (np.roll(x, columns // 2, axis=2) for x in (D, known))
     D = np.where(known, D, np.where(seen, turned, 0))
-    filled = known | seen
-    number = filled.sum(axis=2)
+    there = known | seen
+    number = there.sum(axis=2)
     ring = D.sum(axis=2) / np.maximum(number, 1)
-    D = np.where(filled, D, ring[..., None])
+    D = np.where(there, D, ring[..., None])
     for r in range(1, D.shape[1]):
         empty = number[:, r] == 0
         D[empty, r] = D[empty, r - 1]

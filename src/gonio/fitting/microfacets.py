@@ -29,7 +29,7 @@ from ..brdf.polar_grid import PolarGrid
 from ..directions import normalise
 from ..errors import MEMORY_LIMIT, AccuracyWarning, ArrayError, MemoryLimitError, ParameterError
 from ..threads import one_blas_thread, processors
-from .completion import CompletedNDFs, complete_ndfs, completed
+from .completion import CompletedNDFs, complete_ndfs, filled
 from .facet_cells import Cells, Joined, Measured, Slices
 from .facet_domain import Domain
 from .facet_index import estimate_index, facing
@@ -251,7 +251,7 @@ class _Partial:
         done = len(self.measured) - sum(len(self.cells.cells[k].sites) for k in left)
         for k, tables in zip(left, self._fitted(left), strict=True):
             sites = self.cells.cells[k].sites
-            values[sites] = completed(tables, self.lit[k])[:, self.somewhere]
+            values[sites] = filled(tables, self.lit[k])[:, self.somewhere]
             begun[k] = True
             done += len(sites)
             hear(done, len(self.measured))
