@@ -7,7 +7,7 @@ import zipfile
 
 import numpy as np
 import pytest
-from reference.archives import rewritten, with_array, with_fields, without
+from reference.archives import first, rewritten, with_array, with_fields, without
 
 import gonio as gn
 from gonio.brdf.facet_mixture import FacetBasis, FacetMixture
@@ -103,17 +103,6 @@ def test_many_tables_are_counted_in_whole_numbers_that_suffice(tmp_path, view):
         write_relightable(path, Relightable(view, FacetMixture(basis, [count - 1], [1.0])))
         assert stored(path, "indices").dtype == dtype
         assert read_relightable(path).material.indices[0] == count - 1
-
-
-def first(value):
-    """The array with its first number changed."""
-
-    def change(array):
-        array = array.copy()
-        array.flat[0] = value
-        return array
-
-    return change
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ import zipfile
 
 import numpy as np
 import pytest
-from reference.archives import rewritten, with_array, with_fields, without
+from reference.archives import first, rewritten, with_array, with_fields, without
 
 import gonio as gn
 from gonio.brdf.coverage import Coverage
@@ -98,17 +98,6 @@ def test_other_materials_are_refused_and_leave_no_file(tmp_path, rng, view, mate
         with pytest.raises(gn.errors.FileError, match=r"a (Lambert|Sum) is not written"):
             write_relightable(path, Relightable(view, given))
     assert not path.exists()
-
-
-def first(value):
-    """The array with its first number changed."""
-
-    def change(array):
-        array = array.copy()
-        array.flat[0] = value
-        return array
-
-    return change
 
 
 @pytest.mark.parametrize(

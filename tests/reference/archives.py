@@ -35,3 +35,14 @@ def with_array(name, change):
         return entries | {f"{name}.npy": buffer.getvalue()}
 
     return changed
+
+
+def first(value):
+    """The array with its first number changed."""
+
+    def change(array):
+        array = array.copy()
+        array.flat[0] = value
+        return array
+
+    return change

@@ -27,7 +27,7 @@ from ..brdf.polar_grid import PolarGrid
 from ..errors import ArrayError
 from ..threads import processors
 from .turnable import Turnable
-from .turned import Nearest, nearest_turns
+from .turned import Nearest, nearest_turns, turned_columns
 
 _RANGES = 12  # of turns
 _CANDIDATES = 4  # of each range
@@ -125,8 +125,8 @@ class Partial:
 
     def turned(self, which: np.ndarray, turn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """D and W of some (m,), each turned by so many columns."""
-        columns = (np.arange(self.grid.columns) - turn[:, None]) % self.grid.columns
-        place = which[:, None, None], np.arange(self.grid.rows)[:, None], columns[:, None]
+        columns = turned_columns(self.grid.columns, turn)[:, None]
+        place = which[:, None, None], np.arange(self.grid.rows)[:, None], columns
         return self.D[place], self.W[place]
 
     def scale(self, D: np.ndarray, W: np.ndarray, D2: np.ndarray, W2: np.ndarray) -> np.ndarray:

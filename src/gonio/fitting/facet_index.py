@@ -17,7 +17,7 @@ from ..arrays import Array, to_numpy
 from ..brdf.fresnel import dielectric
 from ..brdf.polar_grid import PolarGrid
 from .turnable import Turnable
-from .turned import Best, best_turns
+from .turned import Best, best_turns, turned_columns
 
 LEAST, MOST = 1.15, 2.5  # clear dielectrics, and what shines as they do
 _CANDIDATES = np.linspace(LEAST, MOST, 16)
@@ -57,11 +57,6 @@ def estimate_index(
                 )
         eta = _least(np.where(told > 0, off, off.sum(axis=1, keepdims=True)), start)
     return eta
-
-
-def turned_columns(columns: int, turn: np.ndarray) -> np.ndarray:
-    """(n, columns): where each column of a table turned by `turn` (n,) columns comes from."""
-    return np.asarray((np.arange(columns) - turn[:, None]) % columns)
 
 
 def _apart(

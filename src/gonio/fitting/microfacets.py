@@ -46,7 +46,7 @@ _FLOOR = 0.05  # of a site's mean radiance: darker lights are noise or shadow (M
 _GRAZING = 0.1  # cosine of light below which k_d is not looked for
 _INDEX = 1.5  # where the search for eta begins
 _BLOCK = 256
-_KEPT = 300  # operators at once
+_OPERATORS = 300  # at once
 _COMMON = 0.7  # of what one site shows, shown by all: it is enough to tell sites apart
 _LOOKED_AT = 200  # sites, first of all
 _UNLIKE = 0.02  # relative squares: 14 % of D; .003 where facets recur, .05 to .5 where they do not
@@ -104,7 +104,7 @@ def synthesise_ndfs(
 
     workers = processors() if threads is None else threads
     partial = _Partial(sample, grid, tolerance, _INDEX if eta is None else eta, workers)
-    _require_alike(partial, grid)
+    _tell_if_unlike(partial, grid)
     values = partial.values(None if folder is None else Path(folder), hear("partial distributions"))
     chosen = choose_representatives(
         lambda low, high: values[low:high] * partial.weights,
@@ -114,10 +114,8 @@ def synthesise_ndfs(
         hear("representatives"),
     )
     few = partial.of(values, chosen.texels)
-    index = np.full(len(chosen.texels), _INDEX if eta is None else eta)
     if eta is None:
-        index = estimate_index(few.tables, few.confidence, few.cosines, grid, _INDEX)
-        few = few.indexed(index)
+        few = few.indexed(estimate_index(few.tables, few.confidence, few.cosines, grid, _INDEX))
     if paper:
         completed = grow_ndfs(few.tables, few.confidence, grid, progress=hear("synthesis"))
         whole = completed.tables
@@ -129,7 +127,7 @@ def synthesise_ndfs(
         basis,
         chosen.indices,
         chosen.weights / chosen.weights.sum(axis=1, keepdims=True),
-        eta=np.clip(np.sum(chosen.weights * index[chosen.indices], axis=1), 1.01, 10),
+        eta=np.clip(np.sum(chosen.weights * few.eta[chosen.indices], axis=1), 1.01, 10),
     )
     material, residual, total = _coloured(sample, mixture, workers, hear("colours"))
     return Fit(
@@ -140,7 +138,7 @@ def synthesise_ndfs(
     )
 
 
-def _require_alike(partial: _Partial, grid: PolarGrid) -> None:
+def _tell_if_unlike(partial: _Partial, grid: PolarGrid) -> None:
     """Looks at a few sites before hours are spent: whether their facets recur at other turns."""
     some = np.unique(np.linspace(0, len(partial.measured) - 1, _LOOKED_AT).astype(int))
     few = partial.looked_at(some)
@@ -297,7 +295,7 @@ class _Partial:
             for low in range(0, len(cells), 8 * self.workers):
                 some = cells[low : low + 8 * self.workers]
                 nodes = {int(n) for k in some for n in self.cells.cells[k].nodes}
-                for number in [n for n in self._operators if n not in nodes][:-_KEPT]:
+                for number in [n for n in self._operators if n not in nodes][:-_OPERATORS]:
                     self._operators.pop(number)
                 self._make(sorted(nodes - set(self._operators)), pool)
                 yield from pool.map(self._fit, some)

@@ -103,9 +103,7 @@ def best_turns(
     interval in [0, 1] and for other coarse and keep, `MemoryLimitError` where `memory` is too little for one pair.
     """
     require_alike(first, second)
-    low, high = overlap
-    if not 0 <= low <= high <= 1:
-        raise ParameterError(f"overlap = ({low:g}, {high:g}); an interval within [0, 1] is wanted.")
+    _require_interval(overlap)
     if keep < 1:
         raise ParameterError(f"keep = {keep}; one or more are wanted.")
     shape = len(first), len(second)
@@ -153,9 +151,7 @@ def nearest_turns(
     """Of each range of turns, columns from the first to before the last, the `count` nearest of B to each of A, each of
     them at its best turn; overlaps, errors and `relative` as of `best_turns`. progress(done, total): of A."""
     require_alike(first, second)
-    low, high = overlap
-    if not 0 <= low <= high <= 1:
-        raise ParameterError(f"overlap = ({low:g}, {high:g}); an interval within [0, 1] is wanted.")
+    _require_interval(overlap)
     A, B = len(first), len(second)
     count = min(count, B)
     if count < 1:
@@ -184,6 +180,17 @@ def nearest_turns(
         if progress is not None:
             progress(a.stop, A)
     return found
+
+
+def turned_columns(columns: int, turn: np.ndarray) -> np.ndarray:
+    """(n, columns): where each column of a table turned by `turn` (n,) columns comes from, as numpy.roll has it."""
+    return np.asarray((np.arange(columns) - turn[:, None]) % columns)
+
+
+def _require_interval(overlap: tuple[float, float]) -> None:
+    low, high = overlap
+    if not 0 <= low <= high <= 1:
+        raise ParameterError(f"overlap = ({low:g}, {high:g}); an interval within [0, 1] is wanted.")
 
 
 class _Pairs:
