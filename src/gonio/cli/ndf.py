@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from ..capture.model import Capture
 
 _FEWEST = 12  # lights
+_EDGE_ON = 0.05  # cosine between normal and eye, of sites that show nothing
 _TILTED = 5.0  # degrees, of a flat sample's normals
 _CLIPPED = 0.01  # part of what photographs show
 _AMISS = 0.25  # relative rms, beyond which facets alone do not look like that
@@ -201,7 +202,14 @@ def _facing(scene: Capture, kept: list[int], flat: bool, warn: Callable[[str], N
     if flat:
         return dataclasses.replace(scene, normals=np.broadcast_to([0.0, 0.0, 1.0], (*scene.mask.shape, 3)))
     if scene.normals is not None:
-        return scene
+        sites = scene.sites
+        seen = np.sum(sites.frames[:, 2] * scene.towards_eye(sites.positions), axis=1) > _EDGE_ON
+        if seen.all():
+            return scene
+        warn(f"{np.mean(~seen):.1%} of its sites turn away from the eye, and are left out")
+        mask = scene.mask.copy()
+        mask[mask] = seen
+        return dataclasses.replace(scene, mask=mask)
     scene = captures.shaped(scene, kept)
     normals = np.asarray(scene.normals)[scene.mask]
     tilt = float(np.degrees(np.arccos(normals[:, 2].clip(-1, 1)).mean()))
